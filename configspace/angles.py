@@ -1,0 +1,26 @@
+"""Angles in radians."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["wrap"]
+
+
+def wrap(angle: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the equivalent angle in (-π, π].
+
+    Parameters
+    ----------
+    angle : (...,) float, rad
+
+    Examples
+    --------
+    >>> wrap([0.0, -np.pi, 3 * np.pi / 2]) / np.pi
+    array([ 0. ,  1. , -0.5])
+    """
+    angle = np.asarray(angle, dtype=np.float64)
+    wrapped = np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    # An angle that is in range already is returned to the last bit.
+    return np.where((angle > -np.pi) & (angle <= np.pi), angle, wrapped)

@@ -1,0 +1,204 @@
+"""Building a permissible space: sound tables from the rows of `limits`."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace import cache as space_cache
+from configspace import kernels
+from configspace.errors import InvalidVehicle, Problem
+from configspace.exact import active_rows
+from configspace.grid import Grid
+from configspace.limits import LoadRow, SectorRow, rows_of
+from configspace.omni_curve import components
+from configspace.space import PermissibleSpace, SheetHeader, Tables
+from configspace.vehicle import Vehicle
+
+__all__ = ["build_space"]
+
+FloatArray = npt.NDArray[np.float64]
+_KINDS = {"disc": 0, "strip": 1, "product": 2}
+
+
+def build_space(
+    vehicle: Vehicle,
+    grid: Grid | None = None,
+    cache: bool | str | Path = True,
+) -> PermissibleSpace:
+    """Compute the permissible configuration space of a vehicle, or take it from cache.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    grid : Grid, optional
+        Default 400 × 720 cells.
+    cache : bool or path
+        True: the folder named by ``OMNIPLAN_CACHE`` or the platform's cache folder;
+        False: compute; a path: this folder.
+
+    Returns
+    -------
+    PermissibleSpace
+        Sound over whole cells; knows its vehicle, so mixed cells are settled exactly.
+
+    Raises
+    ------
+    InvalidVehicle
+        If some permitted configuration has no speed limit at all.
+
+    Examples
+    --------
+    >>> from configspace import load_vehicle
+    >>> space = build_space(load_vehicle("mecanum"), cache=False)
+    >>> bool(space.contains(0.0, 0.0, 1.2))
+    True
+    """
+    grid = grid or Grid()
+    if cache is False:
+        return _compute(vehicle, grid)
+    folder = space_cache.default_folder() if cache is True else Path(cache)
+    cached = space_cache.read(folder, vehicle, grid)
+    if cached is not None:
+        return cached
+    space = _compute(vehicle, grid)
+    space_cache.write(folder, space)
+    return space
+
+
+def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
+    line = vehicle.mobility.line_beta
+    beta = np.array([line, line]) if line is not None else grid.beta_edges
+    loads, sectors = rows_of(vehicle)
+    directions = [active_rows(loads, False)]
+    if any(row.direction == "reverse" for row in loads):
+        directions.append(active_rows(loads, True))
+    c, s = components(grid.kappa_edges)
+    e = np.exp(1j * beta)
+    nodes, low, high, state, reason, wheel = [], [], [], None, [], []
+    for rows in directions:
+        _reject_unlimited(vehicle, rows, c, s, e)
+        table = _load_table(rows)
+        pad = _pad(rows, c, s, float(beta[1] - beta[0]))
+        nodes.append(kernels.node_loads(c, s, e, *table, pad))
+        bounds = kernels.cell_bounds(
+            c,
+            s,
+            e,
+            *table,
+            np.array([int(row.reason) for row in rows]),
+            np.array([row.wheel for row in rows]),
+            *_sector_table(sectors),
+        )
+        low.append(bounds[0])
+        high.append(bounds[1])
+        state = bounds[2]  # steering does not depend on the driving direction
+        reason.append(bounds[3])
+        wheel.append(bounds[4])
+    assert state is not None
+    blocked = state != kernels.FREE
+    with np.errstate(divide="ignore"):
+        v_lo = np.where(blocked, 0.0, 1 / np.sqrt(np.array(high)))
+        v_hi = np.where(
+            state == kernels.BLOCKED, 0.0, 1 / np.sqrt(np.maximum(low, 1e-300))
+        )
+    tables = Tables(
+        load=_rounded_up(np.array(nodes) * (1 + 1e-14)),
+        v_lo=-_rounded_up(-v_lo * (1 - 1e-14)),
+        v_hi=_rounded_up(np.minimum(v_hi * (1 + 1e-14), 3e38)),
+        state=state,
+        reason=np.array(reason),
+        wheel=np.array(wheel),
+    )
+    header = SheetHeader.of(vehicle, grid)
+    return PermissibleSpace(header=header, tables=tables, vehicle=vehicle)
+
+
+def _load_table(rows: Sequence[LoadRow]) -> tuple[npt.NDArray[np.generic], ...]:
+    return (
+        np.array([_KINDS[row.kind] for row in rows]),
+        np.array([row.p for row in rows]),
+        np.array([row.b for row in rows], dtype=complex),
+        np.array([cmath.exp(1j * row.nu) for row in rows]),
+    )
+
+
+def _sector_table(rows: Sequence[SectorRow]) -> tuple[npt.NDArray[np.generic], ...]:
+    def unit(angle: float) -> complex:
+        return cmath.exp(1j * angle) if math.isfinite(angle) else 1 + 0j
+
+    return (
+        np.array([row.b for row in rows], dtype=complex),
+        np.array([unit(row.middle) for row in rows], dtype=complex),
+        np.array([unit(row.middle - row.half) for row in rows], dtype=complex),
+        np.array([unit(row.middle + row.half) for row in rows], dtype=complex),
+        # The normal of a half-plane clear of the forbidden sector stands at most
+        # half - π/2 from the middle; cos(half - π/2) = sin(half).
+        np.array(
+            [-1.0 if math.isinf(row.half) else math.sin(row.half) for row in rows]
+        ),
+        np.array([row.half <= math.pi / 2 for row in rows], dtype=bool),
+        np.array([row.wheel for row in rows], dtype=np.int16),
+    )
+
+
+def _pad(
+    rows: Sequence[LoadRow], c: FloatArray, s: FloatArray, width: float
+) -> FloatArray:
+    """Return what a row of nodes needs so that interpolating in β cannot be too low.
+
+    A squared load is convex in κ_n, so linear interpolation there is never too low;
+    in β it is off by at most ``width²/8 max(-∂²load/∂β²)``, which is bounded in closed
+    form and grows towards one edge of each cell. A row of nodes serves the cells on
+    both sides of it, hence the largest of three neighbours.
+    """
+    curvature = np.zeros_like(c)
+    for row in rows:
+        if row.kind == "disc":
+            bound = 2 * c * np.abs(s) * row.p * abs(row.b)
+        elif row.kind == "strip":
+            h = abs((row.b * cmath.exp(-1j * row.nu)).real)
+            bound = 2 * (c * row.p + np.abs(s) * h) * c * row.p
+        else:
+            bound = np.zeros_like(c)
+        curvature = np.maximum(curvature, bound)
+    around = np.pad(curvature, 1, mode="edge")
+    largest = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
+    return width**2 / 8 * largest
+
+
+def _reject_unlimited(
+    vehicle: Vehicle,
+    rows: Sequence[LoadRow],
+    c: FloatArray,
+    s: FloatArray,
+    e: npt.NDArray[np.complex128],
+) -> None:
+    if rows:
+        load = kernels.node_loads(c, s, e, *_load_table(rows), np.zeros_like(c))
+        if load.min() > 1e-12:
+            return
+    raise InvalidVehicle(
+        Problem(
+            "limits",
+            "no limit bounds the speed of some configurations",
+            "give max_speed for the driven wheels, or limits.max_speed together with "
+            "limits.max_yaw_rate_deg",
+        ),
+        subject=f"vehicle {vehicle.name}",
+    )
+
+
+def _rounded_up(values: FloatArray) -> npt.NDArray[np.float32]:
+    """Return `values` as float32, never smaller."""
+    single = values.astype(np.float32)
+    return np.where(
+        single.astype(np.float64) < values,
+        np.nextafter(single, np.float32(np.inf)),
+        single,
+    )

@@ -1,0 +1,312 @@
+"""The hot loops of building a space, in numba; `tests/naive.py` holds plain twins.
+
+A cell is a box ``[κ⁰, κ¹] × [β⁰, β¹]`` that does not straddle κ_n = 0 or ±1. On it
+c ≥ 0 and s are affine in κ_n and s keeps its sign, so for each row of `limits`
+
+- a linear functional ``c cos(β - ν) + s h`` is affine in κ_n and a cosine in β:
+  its extremes are at edges in κ_n and closed form in β;
+- a squared disc ``c² p² + s² |b|² + 2 c s p Re(e^{jβ} b̄)`` is convex in κ_n (largest
+  at an edge, least at the vertex of a parabola) and a cosine in β.
+
+Every bound here is therefore exact up to rounding, which `_GUARD` covers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+__all__ = ["FREE", "BLOCKED", "MIXED", "cell_bounds", "node_loads"]  # noqa: RUF022
+
+FREE, BLOCKED, MIXED = 0, 1, 2
+"""States of a cell: permitted all over, nowhere, or to be settled."""
+
+_DISC, _STRIP, _PRODUCT = 0, 1, 2
+_GUARD = 1e-12
+_REASON_STEER, _REASON_SINGULAR = 1, 2
+
+Array = Any  # numba infers the types; mypy cannot look into the kernels
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _cos_range(e0: complex, e1: complex, n: complex) -> tuple[float, float]:
+    """Least and largest |n| cos(β - arg n) for β from arg e0 to arg e1, < π apart."""
+    at0 = e0.real * n.real + e0.imag * n.imag
+    if e0 == e1:  # the one column of a line-mobile vehicle
+        return at0, at0
+    size = abs(n)
+    at1 = e1.real * n.real + e1.imag * n.imag
+    low, high = min(at0, at1), max(at0, at1)
+    side0 = e0.real * n.imag - e0.imag * n.real
+    side1 = n.real * e1.imag - n.imag * e1.real
+    if side0 >= 0 and side1 >= 0:  # n lies between e0 and e1
+        high = size
+    if side0 <= 0 and side1 <= 0:  # -n does
+        low = -size
+    return low, high
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _functional_range(
+    c0: float, s0: float, c1: float, s1: float, low: float, high: float, h: float
+) -> tuple[float, float]:
+    """Least and largest ``c cos + s h`` over a cell; `low`, `high` bound the cosine."""
+    least = min(c0 * low + s0 * h, c1 * low + s1 * h)
+    largest = max(c0 * high + s0 * h, c1 * high + s1 * h)
+    return least, largest
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _disc_range(
+    c0: float, s0: float, c1: float, s1: float, p: float, bb: float, low: float, high: float
+) -> tuple[float, float]:
+    """Least and largest squared disc; `low`, `high` bound ``p Re(e^{jβ} b̄)``."""
+    far, near = (high, low) if s0 + s1 > 0 else (low, high)
+    pp = p * p
+    largest = max(
+        c0 * c0 * pp + s0 * s0 * bb + 2 * c0 * s0 * far,
+        c1 * c1 * pp + s1 * s1 * bb + 2 * c1 * s1 * far,
+    )
+    # Along κ_n: |c p e + s b|² with c, s affine is a parabola A τ² + 2 B τ + C.
+    dc, ds = c1 - c0, s1 - s0
+    a = dc * dc * pp + ds * ds * bb + 2 * dc * ds * near
+    b = c0 * dc * pp + s0 * ds * bb + (c0 * ds + s0 * dc) * near
+    c = c0 * c0 * pp + s0 * s0 * bb + 2 * c0 * s0 * near
+    tau = min(1.0, max(0.0, -b / a)) if a > 0 else 0.0
+    least = (a * tau + 2 * b) * tau + c
+    end = a + 2 * b + c
+    return max(0.0, min(least, end)), largest
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _load_range(
+    kind: int,
+    p: float,
+    b: complex,
+    n: complex,
+    c0: float,
+    s0: float,
+    c1: float,
+    s1: float,
+    e0: complex,
+    e1: complex,
+) -> tuple[float, float]:
+    """Least and largest squared load of one row over a cell."""
+    if kind == _DISC:
+        low, high = _cos_range(e0, e1, p * b)
+        bb = b.real * b.real + b.imag * b.imag
+        return _disc_range(c0, s0, c1, s1, p, bb, low, high)
+    if kind == _STRIP:
+        low, high = _cos_range(e0, e1, p * n)
+        h = b.real * n.real + b.imag * n.imag
+        least, largest = _functional_range(c0, s0, c1, s1, low, high, h)
+        top = max(least * least, largest * largest)
+        bottom = 0.0 if least <= 0 <= largest else min(least * least, largest * largest)
+        return bottom, top
+    at0, at1 = p * p * c0 * abs(s0), p * p * c1 * abs(s1)
+    return min(at0, at1), max(at0, at1)
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _sector_state(
+    b: complex,
+    middle: complex,
+    lower: complex,
+    upper: complex,
+    cos_slack: float,
+    convex: bool,
+    c0: float,
+    s0: float,
+    c1: float,
+    s1: float,
+    e0: complex,
+    e1: complex,
+) -> int:
+    """State of a cell under one steering range.
+
+    `middle`, `lower`, `upper` are unit vectors of the middle and the ends of the range;
+    `convex` says that the range spans at most half a turn. `cos_slack` is the cosine
+    of the largest angle from `middle` at which the normal of a half-plane may stand so
+    that the half-plane keeps clear of the forbidden sector; -1 for no range.
+    """
+    if convex:
+        # Permitted: the wedge between two half-planes.
+        worst = FREE
+        for n in (1j * lower, -1j * upper):
+            low, high = _cos_range(e0, e1, n)
+            h = b.real * n.real + b.imag * n.imag
+            least, largest = _functional_range(c0, s0, c1, s1, low, high, h)
+            if largest < -_GUARD:
+                return BLOCKED
+            if least <= _GUARD:
+                worst = MIXED
+        return worst
+    # Permitted if the cell lies in one half-plane clear of the forbidden wedge; the
+    # normal is the cell's own direction, turned towards the middle where it must.
+    mean_c, mean_s = (c0 + c1) / 2, (s0 + s1) / 2
+    centre = mean_c * (e0 + e1) / 2 + mean_s * b
+    size = abs(centre)
+    if size > _GUARD:
+        n = centre / size
+        cos_n = n.real * middle.real + n.imag * middle.imag
+        if cos_n < cos_slack:
+            side = middle.real * n.imag - middle.imag * n.real
+            sine = math.sqrt(max(0.0, 1 - cos_slack * cos_slack))
+            n = middle * complex(cos_slack, sine if side >= 0 else -sine)
+        low, _ = _cos_range(e0, e1, n)
+        h = b.real * n.real + b.imag * n.imag
+        least, _ = _functional_range(c0, s0, c1, s1, low, low, h)
+        if least > _GUARD:
+            return FREE
+    if cos_slack == -1.0:
+        return MIXED
+    # Blocked if the cell lies in the forbidden wedge.
+    for n in (1j * upper, -1j * lower):
+        low, _ = _cos_range(e0, e1, n)
+        h = b.real * n.real + b.imag * n.imag
+        least, _ = _functional_range(c0, s0, c1, s1, low, low, h)
+        if least <= _GUARD:
+            return MIXED
+    return BLOCKED
+
+
+@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def node_loads(
+    c: Array, s: Array, e: Array, kind: Array, p: Array, b: Array, n: Array, pad: Array
+) -> Array:
+    """Return the largest squared load at every node, padded, as float64.
+
+    Parameters
+    ----------
+    c, s : (k,) float
+        Components of κ_n at the nodes.
+    e : (m,) complex
+        ``exp(j β)`` at the nodes.
+    kind, p, b, n : (r,)
+        The load rows; n is ``exp(j ν)``.
+    pad : (k,) float
+        Added to every node of a row of nodes.
+
+    Returns
+    -------
+    loads : (k, m) float
+    """
+    out = np.empty((c.size, e.size))
+    for k in prange(c.size):
+        for m in range(e.size):
+            worst = 0.0
+            for r in range(kind.size):
+                if kind[r] == _PRODUCT:
+                    load = p[r] * p[r] * c[k] * abs(s[k])
+                else:
+                    z = c[k] * p[r] * e[m] + s[k] * b[r]
+                    if kind[r] == _DISC:
+                        load = z.real * z.real + z.imag * z.imag
+                    else:
+                        along = z.real * n[r].real + z.imag * n[r].imag
+                        load = along * along
+                worst = max(worst, load)
+            out[k, m] = worst + pad[k]
+    return out
+
+
+@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def cell_bounds(
+    c: Array,
+    s: Array,
+    e: Array,
+    kind: Array,
+    p: Array,
+    b: Array,
+    n: Array,
+    row_reason: Array,
+    row_wheel: Array,
+    sector_b: Array,
+    middle: Array,
+    lower: Array,
+    upper: Array,
+    cos_slack: Array,
+    convex: Array,
+    sector_wheel: Array,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return exact bounds, states and reasons of all cells.
+
+    Parameters
+    ----------
+    c, s : (k + 1,) float
+        Components of κ_n at the edges; no kink may lie inside a cell.
+    e : (m + 1,) complex
+        ``exp(j β)`` at the edges.
+    kind, p, b, n, row_reason, row_wheel : (r,)
+        The load rows.
+    sector_b, middle, lower, upper, cos_slack, convex, sector_wheel : (q,)
+        The sector rows, see `_sector_state`.
+
+    Returns
+    -------
+    load_low, load_high : (k, m) float
+        ``load_low ≤ load ≤ load_high`` over the whole cell, steering left aside.
+    state : (k, m) uint8
+        `FREE`, `BLOCKED` or `MIXED`.
+    reason : (k, m) uint16
+        What blocks (blocked, mixed) or may bind (free).
+    wheel : (k, m) int16
+        The wheel that blocks or binds, -1 for the vehicle.
+    """
+    rows, columns = c.size - 1, e.size - 1
+    load_low = np.empty((rows, columns))
+    load_high = np.empty((rows, columns))
+    state = np.empty((rows, columns), np.uint8)
+    reason = np.empty((rows, columns), np.uint16)
+    wheel = np.empty((rows, columns), np.int16)
+    for k in prange(rows):
+        c0, s0, c1, s1 = c[k], s[k], c[k + 1], s[k + 1]
+        tops = np.empty(kind.size)
+        for m in range(columns):
+            e0, e1 = e[m], e[m + 1]
+            low, high, binding = 0.0, 0.0, 0
+            for r in range(kind.size):
+                least, tops[r] = _load_range(
+                    kind[r], p[r], b[r], n[r], c0, s0, c1, s1, e0, e1
+                )
+                low = max(low, least)
+                if tops[r] > high:
+                    high, binding = tops[r], r
+            load_low[k, m] = low
+            load_high[k, m] = high
+            worst, who, why = FREE, -1, 0
+            for q in range(sector_b.size):
+                one = _sector_state(
+                    sector_b[q],
+                    middle[q],
+                    lower[q],
+                    upper[q],
+                    cos_slack[q],
+                    convex[q],
+                    c0,
+                    s0,
+                    c1,
+                    s1,
+                    e0,
+                    e1,
+                )
+                if one == FREE:
+                    continue
+                if worst != BLOCKED:
+                    if one == BLOCKED or worst == FREE:
+                        who = sector_wheel[q]
+                    worst = one
+                free_turning = cos_slack[q] == -1.0
+                why |= _REASON_SINGULAR if free_turning else _REASON_STEER
+            if worst == FREE:
+                who = row_wheel[binding]
+                for r in range(kind.size):
+                    if tops[r] >= low:
+                        why |= row_reason[r]
+            state[k, m] = worst
+            reason[k, m] = why
+            wheel[k, m] = who
+    return load_low, load_high, state, reason, wheel

@@ -1,0 +1,414 @@
+"""The permissible configuration space of one vehicle: its data sheet."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace.angles import wrap
+from configspace.exact import LINE_TOLERANCE, exact_reason, exact_v_max
+from configspace.grid import Grid
+from configspace.kernels import BLOCKED, FREE, MIXED
+from configspace.limits import Reason
+from configspace.omni_curve import finite, nominal_curvature
+from configspace.vehicle import Vehicle
+
+__all__ = ["PermissibleSpace", "SheetHeader", "Tables"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+FORMAT_VERSION = 1
+"""Version of the file format; raise it when the tensors or the header change."""
+ALGORITHM_VERSION = 1
+"""Version of the numbers; raise it when building gives other tables."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The arrays of a data sheet, read-only.
+
+    d is 1, or 2 where driving backwards has limits of its own; a line-mobile vehicle
+    has m = 1 column of cells.
+    """
+
+    load: npt.NDArray[np.float32]
+    """(d, k + 1, m + 1) squared inverse speed at the nodes, (m/s)⁻²; interpolated
+    bilinearly it is never too small anywhere."""
+    v_lo: npt.NDArray[np.float32]
+    """(d, k, m) m/s; v_max is at least this all over the cell."""
+    v_hi: npt.NDArray[np.float32]
+    """(d, k, m) m/s; v_max is at most this all over the cell."""
+    state: npt.NDArray[np.uint8]
+    """(k, m) 0 free, 1 blocked, 2 mixed."""
+    reason: npt.NDArray[np.uint16]
+    """(d, k, m) flags of `Reason`."""
+    wheel: npt.NDArray[np.int16]
+    """(d, k, m) index of the wheel that blocks or binds, -1 for the vehicle."""
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+
+@dataclass(frozen=True)
+class SheetHeader:
+    """What a data sheet says beside its tables."""
+
+    name: str
+    description: str
+    kappa_g: float
+    """Boundary curvature, 1/m."""
+    reference: tuple[float, float]
+    """K in the vehicle file's frame, m."""
+    line_beta: float | None
+    """The constant β of a line-mobile vehicle, rad."""
+    footprint: tuple[tuple[float, float], ...]
+    wheel_ids: tuple[str, ...]
+    grid: Grid
+    fingerprint: str
+    """Content hash of vehicle, grid, format and algorithm."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, grid: Grid) -> SheetHeader:
+        """Return the header for a vehicle on a grid."""
+        k = vehicle.reference
+        return cls(
+            name=vehicle.name,
+            description=vehicle.description,
+            kappa_g=vehicle.boundary_curvature,
+            reference=(k.real, k.imag),
+            line_beta=vehicle.mobility.line_beta,
+            footprint=vehicle.footprint,
+            wheel_ids=tuple(wheel.id for wheel in vehicle.wheels),
+            grid=grid,
+            fingerprint=fingerprint(vehicle, grid),
+        )
+
+
+def fingerprint(vehicle: Vehicle, grid: Grid) -> str:
+    """Return the content hash that names a space in the cache."""
+    content: dict[str, Any] = {
+        "vehicle": vehicle.model_dump(mode="json"),
+        "grid": [grid.n_kappa, grid.n_beta],
+        "format": FORMAT_VERSION,
+        "algorithm": ALGORITHM_VERSION,
+    }
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class PermissibleSpace:
+    """Which (κ_n, β, v_s) a vehicle may take; build it with `build_space`.
+
+    An answer "permitted" is never wrong. Where a cell of the table is mixed, the exact
+    formula settles the point if the vehicle is known; without it the cell counts as
+    blocked.
+    """
+
+    header: SheetHeader
+    tables: Tables
+    vehicle: Vehicle | None = None
+    """The vehicle; None for a space that was read from a data sheet."""
+
+    @property
+    def name(self) -> str:
+        """Name of the vehicle."""
+        return self.header.name
+
+    @property
+    def kappa_g(self) -> float:
+        """Boundary curvature, 1/m."""
+        return self.header.kappa_g
+
+    @property
+    def line_beta(self) -> float | None:
+        """The constant β of a line-mobile vehicle, rad; None for any β."""
+        return self.header.line_beta
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of cells."""
+        return self.header.grid
+
+    def v_max(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, *, reverse: bool = False
+    ) -> FloatArray:
+        """Return the fastest permitted |v_s|; never more than is permitted.
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        reverse : bool
+            For v_n < 0 rather than v_n > 0.
+
+        Returns
+        -------
+        v_max : (...,) float, m/s, ≥ 0
+            0 where blocked.
+
+        Raises
+        ------
+        InvalidInput
+            If a value is not finite or `kappa_n` is outside [-2, 2].
+
+        Examples
+        --------
+        >>> import configspace
+        >>> space = configspace.build_space(
+        ...     configspace.load_vehicle("ift-four-steered"), cache=False)
+        >>> space.v_max([0.0, 1.0, 0.0], [0.0, 0.0, 3.0]).round(3)
+        array([1.   , 0.583, 0.   ])
+        """
+        kappa_n, beta = self._checked(kappa_n, beta)
+        row, column, fk, fb, on_line = self._locate(kappa_n, beta)
+        load = self._interpolated(row, column, fk, fb, reverse)
+        state = self.tables.state[row, column]
+        # 1 / sqrt may round up; one part in 2**50 keeps the promise.
+        v = np.where((state == FREE) & on_line, (1 - 1e-15) / np.sqrt(load), 0.0)
+        mixed = (state == MIXED) & on_line
+        if self.vehicle is not None and mixed.any():
+            v[mixed] = exact_v_max(
+                self.vehicle, kappa_n[mixed], beta[mixed], reverse=reverse
+            )
+        return v
+
+    def contains(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, v_s: npt.ArrayLike
+    ) -> BoolArray:
+        """Return whether configurations are permitted at these speeds.
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        v_s : (...,) float, m/s
+            Negative for driving the configuration backwards.
+
+        Returns
+        -------
+        permitted : (...,) bool
+
+        Raises
+        ------
+        InvalidInput
+            If a value is not finite or `kappa_n` is outside [-2, 2].
+        """
+        kappa_n, beta = self._checked(kappa_n, beta)
+        kappa_n, beta, v_s = np.broadcast_arrays(
+            kappa_n, beta, finite("v_s", v_s, "m/s")
+        )
+        bound = self.v_max(kappa_n, beta)
+        if len(self.tables.load) > 1:
+            backwards = self.v_max(kappa_n, beta, reverse=True)
+            bound = np.where(v_s < 0, backwards, bound)
+        return np.asarray((np.abs(v_s) <= bound) & (bound > 0))
+
+    def reason(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, *, reverse: bool = False
+    ) -> npt.NDArray[np.uint16]:
+        """Return which limits block or bind.
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        reverse : bool
+
+        Returns
+        -------
+        reason : (...,) uint16
+            Flags of `Reason`: exact where the vehicle is known, else those of the cell.
+        """
+        return self.explain(kappa_n, beta, reverse=reverse)[0]
+
+    def explain(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, *, reverse: bool = False
+    ) -> tuple[npt.NDArray[np.uint16], npt.NDArray[np.int16]]:
+        """Return which limits block or bind, and the index of the wheel (-1: none).
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        reverse : bool
+
+        Returns
+        -------
+        reason : (...,) uint16
+        wheel : (...,) int16
+        """
+        kappa_n, beta = self._checked(kappa_n, beta)
+        if self.vehicle is not None:
+            return exact_reason(self.vehicle, kappa_n, beta, reverse=reverse)
+        row, column, _, _, on_line = self._locate(kappa_n, beta)
+        direction = self._direction(reverse)
+        why = self.tables.reason[direction, row, column]
+        who = self.tables.wheel[direction, row, column]
+        return (
+            np.where(on_line, why, np.uint16(Reason.FIXED_WHEEL)),
+            np.where(on_line, who, np.int16(-1)),
+        )
+
+    def box(
+        self,
+        kappa_low: FloatArray,
+        kappa_high: FloatArray,
+        beta_low: FloatArray,
+        beta_high: FloatArray,
+        *,
+        reverse: bool = False,
+    ) -> tuple[npt.NDArray[np.uint8], FloatArray]:
+        """Return what the table says of whole boxes in the (κ_n, β) plane.
+
+        Only boxes of at most two cells by two, or of at most two rows over all β, are
+        looked at closely; anything larger is `MIXED`, to be divided by the caller.
+
+        Parameters
+        ----------
+        kappa_low, kappa_high : (n,) float, 1, [-2, 2]
+        beta_low, beta_high : (n,) float, rad
+            ``beta_low ≤ beta_high``, not wrapped; ignored for a line-mobile vehicle,
+            whose caller has made sure that β is the constant one.
+        reverse : bool
+
+        Returns
+        -------
+        state : (n,) uint8
+            `FREE` or `BLOCKED` hold all over the box.
+        v_low : (n,) float, m/s
+            v_max is at least this all over the box where it is `FREE`.
+        """
+        load = self.tables.load[self._direction(reverse)]
+        state = self.tables.state
+        rows, columns = state.shape
+        k0, f0 = self._row(kappa_low)
+        k1, f1 = self._row(kappa_high)
+        if columns == 1:
+            m0, g0 = np.zeros_like(k0), np.zeros_like(f0)
+            m1, g1 = m0, g0
+        else:
+            m0, g0 = self._column(beta_low)
+            span = np.maximum(beta_high - beta_low, 0.0)
+            step = 2 * np.pi / columns
+            reach = g0 + span / step * (1 + 1e-12)
+            m1 = m0 + np.floor(reach).astype(np.int64)
+            g1 = reach - np.floor(reach)
+        near = (k1 - k0 <= 1) & (m1 - m0 <= 1)
+        left, right = m0 % columns, m1 % columns
+        corners = [state[k0, left], state[k0, right], state[k1, left], state[k1, right]]
+        all_free = np.all([x == FREE for x in corners], axis=0)
+        all_blocked = np.all([x == BLOCKED for x in corners], axis=0)
+        # Inside one cell the interpolant of a box is largest at the box's corners;
+        # across cells the largest node of all of them bounds it.
+        inside = (k0 == k1) & (m0 == m1)
+        at_corners = np.max(
+            [
+                _bilinear(load, k0, left, x, y)
+                for x, y in ((f0, g0), (f0, g1), (f1, g0), (f1, g1))
+            ],
+            axis=0,
+        )
+        at_nodes = np.max(
+            [
+                load[k + i, m + j]
+                for k in (k0, k1)
+                for m in (left, right)
+                for i in (0, 1)
+                for j in (0, 1)
+            ],
+            axis=0,
+        )
+        worst = np.where(inside, at_corners, at_nodes)
+        # A box over all β, as at the poles: whole rows of cells.
+        ring = (k1 - k0 <= 1) & ~near
+        row_free = (state == FREE).all(axis=1)
+        row_load = np.maximum(load[:-1].max(axis=1), load[1:].max(axis=1))
+        all_free = np.where(ring, row_free[k0] & row_free[k1], all_free & near)
+        worst = np.where(ring, np.maximum(row_load[k0], row_load[k1]), worst)
+        answer = np.full(k0.shape, MIXED, np.uint8)
+        answer[all_free] = FREE
+        answer[all_blocked & near] = BLOCKED
+        return answer, (1 - 1e-14) / np.sqrt(worst)
+
+    def save(self, path: str | Path) -> None:
+        """Write the data sheet; it can be used without the vehicle.
+
+        Raises
+        ------
+        CacheError
+            If the file cannot be written; an older file of that name stays as it is.
+        """
+        from configspace.storage import save_space
+
+        save_space(self, Path(path))
+
+    def _checked(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        kappa_n, beta = np.broadcast_arrays(
+            nominal_curvature(kappa_n), finite("beta", beta, "rad")
+        )
+        return kappa_n, beta
+
+    def _direction(self, reverse: bool) -> Literal[0, 1]:
+        return 1 if reverse and len(self.tables.load) > 1 else 0
+
+    def _row(self, kappa_n: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Return the row of cells and the place within it, 0 to 1."""
+        position = (kappa_n + 2) * (self.grid.n_kappa / 4)
+        row = np.clip(position.astype(np.int64), 0, self.grid.n_kappa - 1)
+        return row, position - row
+
+    def _column(self, beta: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Return the column of cells and the place within it, 0 to 1."""
+        columns = self.tables.state.shape[1]
+        position = np.mod(beta + np.pi, 2 * np.pi) * (columns / (2 * np.pi))
+        column = np.clip(position.astype(np.int64), 0, columns - 1)
+        return column, np.clip(position - column, 0.0, 1.0)
+
+    def _locate(
+        self, kappa_n: FloatArray, beta: FloatArray
+    ) -> tuple[
+        npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray, FloatArray, BoolArray
+    ]:
+        row, fk = self._row(kappa_n)
+        if self.line_beta is None:
+            column, fb = self._column(beta)
+            return row, column, fk, fb, np.ones(row.shape, dtype=bool)
+        pole = np.abs(kappa_n) == 2  # rotation about K: β has no meaning
+        on_line = (np.abs(wrap(beta - self.line_beta)) <= LINE_TOLERANCE) | pole
+        return row, np.zeros_like(row), fk, np.zeros_like(fk), on_line
+
+    def _interpolated(
+        self,
+        row: npt.NDArray[np.int64],
+        column: npt.NDArray[np.int64],
+        fk: FloatArray,
+        fb: FloatArray,
+        reverse: bool,
+    ) -> FloatArray:
+        return _bilinear(
+            self.tables.load[self._direction(reverse)], row, column, fk, fb
+        )
+
+
+def _bilinear(
+    nodes: npt.NDArray[np.float32],
+    row: npt.NDArray[np.int64],
+    column: npt.NDArray[np.int64],
+    fk: FloatArray,
+    fb: FloatArray,
+) -> FloatArray:
+    """Return nodes interpolated bilinearly within their cells."""
+    below = (1 - fb) * nodes[row, column] + fb * nodes[row, column + 1]
+    above = (1 - fb) * nodes[row + 1, column] + fb * nodes[row + 1, column + 1]
+    return np.asarray((1 - fk) * below + fk * above, dtype=np.float64)

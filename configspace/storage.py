@@ -1,0 +1,162 @@
+"""Data sheets as files: safetensors, self-describing, checksummed, no pickle."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from safetensors import SafetensorError
+from safetensors import numpy as safetensors
+
+from configspace.errors import CacheError
+from configspace.grid import Grid
+from configspace.space import (
+    ALGORITHM_VERSION,
+    FORMAT_VERSION,
+    PermissibleSpace,
+    SheetHeader,
+    Tables,
+)
+
+__all__ = ["dump_space", "load_space", "parse_space", "save_space"]
+
+_FORMAT = "omniplan data sheet"
+_DTYPES = {
+    "load": np.float32,
+    "v_lo": np.float32,
+    "v_hi": np.float32,
+    "state": np.uint8,
+    "reason": np.uint16,
+    "wheel": np.int16,
+}
+
+
+def dump_space(space: PermissibleSpace) -> bytes:
+    """Return the data sheet as bytes."""
+    tensors = {
+        name: np.ascontiguousarray(getattr(space.tables, name)) for name in _DTYPES
+    }
+    header = json.dumps(asdict(space.header), sort_keys=True)
+    metadata = {
+        "format": _FORMAT,
+        "format_version": str(FORMAT_VERSION),
+        "algorithm_version": str(ALGORITHM_VERSION),
+        "header": header,
+        "checksum": _checksum(header, tensors),
+    }
+    return bytes(safetensors.save(tensors, metadata=metadata))
+
+
+def save_space(space: PermissibleSpace, path: Path) -> None:
+    """Write a data sheet: to a temporary name, synced, then renamed.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; nothing half written is left behind.
+    """
+    temporary: str | None = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(dump_space(space))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        raise CacheError(f"data sheet {path}: cannot be written: {error}") from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(temporary)
+
+
+def load_space(path: str | Path) -> PermissibleSpace:
+    """Read a data sheet; the space answers without knowing the vehicle's insides.
+
+    Raises
+    ------
+    CacheError
+        If the file is missing, damaged or of another version.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise CacheError(f"data sheet {path}: cannot be read: {error}") from error
+    return parse_space(content, subject=f"data sheet {path}")
+
+
+def parse_space(content: bytes, subject: str = "data sheet") -> PermissibleSpace:
+    """Return the space that a data sheet's bytes describe.
+
+    Raises
+    ------
+    CacheError
+        If the bytes are damaged or of another version.
+    """
+    metadata = _metadata(content, subject)
+    if metadata.get("format") != _FORMAT:
+        raise CacheError(f"{subject}: not an {_FORMAT}")
+    for key, known in (
+        ("format_version", FORMAT_VERSION),
+        ("algorithm_version", ALGORITHM_VERSION),
+    ):
+        if metadata.get(key) != str(known):
+            raise CacheError(
+                f"{subject}: {key} {metadata.get(key)}; this program reads {known}"
+            )
+    try:
+        tensors = safetensors.load(content)
+    except (SafetensorError, ValueError) as error:
+        raise CacheError(f"{subject}: damaged: {error}") from error
+    header_text = metadata.get("header", "")
+    if _checksum(header_text, tensors) != metadata.get("checksum"):
+        raise CacheError(f"{subject}: damaged: the checksum does not match")
+    try:
+        header = _header(header_text)
+        tables = Tables(**{name: tensors[name] for name in _DTYPES})
+    except (KeyError, TypeError, ValueError) as error:
+        raise CacheError(f"{subject}: damaged: {error!r}") from error
+    return PermissibleSpace(header=header, tables=tables)
+
+
+def _metadata(content: bytes, subject: str) -> dict[str, str]:
+    """Return the free-text part of a safetensors header."""
+    try:
+        size = int.from_bytes(content[:8], "little")
+        if len(content) < 8 or size > len(content) - 8:
+            raise ValueError("truncated")
+        metadata = json.loads(content[8 : 8 + size])["__metadata__"]
+        return {str(key): str(value) for key, value in metadata.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise CacheError(f"{subject}: damaged: {error!r}") from error
+
+
+def _header(text: str) -> SheetHeader:
+    data = json.loads(text)
+    x, y = data.pop("reference")
+    return SheetHeader(
+        **{
+            **data,
+            "reference": (x, y),
+            "grid": Grid(**data["grid"]),
+            "footprint": tuple((px, py) for px, py in data["footprint"]),
+            "wheel_ids": tuple(data["wheel_ids"]),
+        }
+    )
+
+
+def _checksum(header: str, tensors: dict[str, npt.NDArray[np.generic]]) -> str:
+    digest = hashlib.sha256(header.encode())
+    for name in sorted(tensors):
+        array = np.ascontiguousarray(tensors[name])
+        digest.update(f"{name}{array.dtype.str}{array.shape}".encode())
+        digest.update(array.data)
+    return digest.hexdigest()

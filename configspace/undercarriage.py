@@ -1,0 +1,101 @@
+"""How freely an undercarriage moves: all over the plane or along a line.
+
+Fixed standard wheels leave only centres of rotation on their axle line; K is moved
+onto it, which makes the side-slip angle constant (spec/omni-curve §2).
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = ["Mobility", "WheelPlace", "mobility_of"]
+
+# Wheels within a micrometre and a micro-radian share one axle.
+_LENGTH = 1e-6
+_ANGLE = 1e-6
+
+
+@dataclass(frozen=True)
+class WheelPlace:
+    """What the mobility of a vehicle depends on, per wheel."""
+
+    id: str
+    type: str
+    position: complex
+    heading: float
+    driven: bool
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Where K is and which β the vehicle can take."""
+
+    reference: complex
+    """K in the file's frame, m."""
+    line_beta: float | None
+    """The constant β of a line-mobile vehicle, rad; None for any β."""
+
+
+def mobility_of(wheels: Sequence[WheelPlace], reference: complex) -> Mobility:
+    """Return the mobility of a set of wheels.
+
+    Parameters
+    ----------
+    wheels : sequence of WheelPlace
+    reference : complex, m
+        K as the file wants it; moved to the axle line of a line-mobile vehicle.
+
+    Raises
+    ------
+    ValueError
+        If the wheels cannot move together; the text says which and why.
+    """
+    if all(w.type == "castor" for w in wheels):
+        raise ValueError("wheels: only castors; at least one other wheel is needed")
+    _reject_mecanum_with_driven_wheels(wheels)
+    fixed = [w for w in wheels if w.type == "fixed"]
+    if not fixed:
+        return Mobility(reference, None)
+    first = fixed[0]
+    axle = cmath.exp(1j * (first.heading + math.pi / 2))
+    for other in fixed[1:]:
+        _reject_second_axle(first, other, axle)
+    # The rolling direction nearer to the x axis is forward.
+    heading = math.remainder(first.heading, 2 * math.pi)
+    if abs(heading) > math.pi / 2 + _ANGLE:
+        heading = math.remainder(heading + math.pi, 2 * math.pi)
+    along = ((reference - first.position) * axle.conjugate()).real
+    foot = first.position + along * axle
+    # Keep the file's K to the last bit where it is on the axle already.
+    return Mobility(reference if abs(foot - reference) < 1e-12 else foot, heading + 0.0)
+
+
+def _reject_second_axle(first: WheelPlace, other: WheelPlace, axle: complex) -> None:
+    parallel = abs(math.remainder(other.heading - first.heading, math.pi)) < _ANGLE
+    if not parallel:
+        raise ValueError(
+            f"wheels: the fixed wheels {first.id} and {other.id} have axles that cross, "
+            "so the vehicle could only turn about that one point; all fixed wheels "
+            "must share one axle line"
+        )
+    apart = ((other.position - first.position) * axle.conjugate()).imag
+    if abs(apart) > _LENGTH:
+        raise ValueError(
+            f"wheels: the fixed wheels {first.id} and {other.id} have parallel axles "
+            f"{abs(apart):.4g} m apart, so the vehicle cannot turn; all fixed wheels "
+            "must share one axle line"
+        )
+
+
+def _reject_mecanum_with_driven_wheels(wheels: Sequence[WheelPlace]) -> None:
+    rollers = [w for w in wheels if w.type in {"mecanum", "omni"}]
+    driven = [w for w in wheels if w.type in {"steered", "fixed"} and w.driven]
+    if rollers and driven:
+        raise ValueError(
+            f"wheels: {rollers[0].id} ({rollers[0].type}) together with the driven "
+            f"standard wheel {driven[0].id}; a standard wheel lacks the freedom "
+            "of the rollers, so the two cannot be combined"
+        )

@@ -1,0 +1,272 @@
+"""What a vehicle file says: wheels, limits, reference point.
+
+Keys are those of the file: SI units, degrees only in keys that end in ``_deg``.
+Numbers derived from them (K, κ_g, the axle of a line-mobile vehicle) are computed in
+`configspace.undercarriage`; use `load_vehicle` to read a file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from functools import cached_property
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from configspace.undercarriage import Mobility, WheelPlace, mobility_of
+
+__all__ = [
+    "Castor",
+    "FixedWheel",
+    "Limits",
+    "MecanumWheel",
+    "OmniWheel",
+    "SteeredWheel",
+    "Vehicle",
+    "Wheel",
+]
+
+# Generous bounds whose only purpose is to catch millimetres, km/h and radians.
+Metres: TypeAlias = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Speed: TypeAlias = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+Acceleration: TypeAlias = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+Degrees: TypeAlias = Annotated[float, Field(ge=-36000, le=36000, allow_inf_nan=False)]
+DegreeRate: TypeAlias = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+RollerDegrees: TypeAlias = Annotated[float, Field(ge=-80, le=80, allow_inf_nan=False)]
+Curvature: TypeAlias = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+
+
+class _Model(BaseModel):
+    """Frozen, strict, no unknown keys."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False
+    )
+
+
+class _PlacedWheel(_Model):
+    id: str = Field(min_length=1, max_length=64, description="unique within a vehicle")
+    x: Metres = Field(description="contact point (steering axis), m, forward positive")
+    y: Metres = Field(description="m, left positive")
+
+    @property
+    def position(self) -> complex:
+        """Position in the file's frame as ``x + j y``, m."""
+        return complex(self.x, self.y)
+
+
+class _RollingWheel(_PlacedWheel):
+    max_speed: Speed | None = Field(
+        None, description="largest rolling speed, m/s; without it the wheel is passive"
+    )
+    max_acceleration: Acceleration | None = Field(
+        None, description="largest change of the rolling speed, m/s²"
+    )
+
+
+class SteeredWheel(_RollingWheel):
+    """A steered standard wheel; α is measured from the vehicle's x axis."""
+
+    type: Literal["steered"] = "steered"
+    steering_range_deg: tuple[Degrees, Degrees] | None = Field(
+        None, description="[least, largest] steering angle; without it it turns freely"
+    )
+    max_steering_rate_deg: DegreeRate | None = Field(None, description="degrees/s")
+    max_steering_acceleration_deg: DegreeRate | None = Field(
+        None, description="degrees/s²; not judged yet, reports say so"
+    )
+    offset: Annotated[float, Field(ge=0, le=0)] = Field(
+        0.0, description="lateral axle offset D, m; only 0 is supported yet"
+    )
+
+    @model_validator(mode="after")
+    def _range_is_ordered(self) -> SteeredWheel:
+        if self.steering_range_deg is not None:
+            least, largest = self.steering_range_deg
+            if least >= largest:
+                raise PydanticCustomError(
+                    "steering_range",
+                    "steering_range_deg: the first angle must be less than the second",
+                )
+        return self
+
+    @property
+    def steering_range(self) -> tuple[float, float]:
+        """Least and largest steering angle, rad; infinite where it turns freely."""
+        if self.steering_range_deg is None:
+            return (-math.inf, math.inf)
+        least, largest = self.steering_range_deg
+        return (math.radians(least), math.radians(largest))
+
+
+class FixedWheel(_RollingWheel):
+    """A fixed standard wheel; it makes the vehicle line-mobile."""
+
+    type: Literal["fixed"] = "fixed"
+    heading_deg: Degrees = Field(0.0, description="rolling direction δ")
+
+    @property
+    def heading(self) -> float:
+        """Rolling direction δ, rad."""
+        return math.radians(self.heading_deg)
+
+
+class _RollerWheel(_PlacedWheel):
+    max_speed: Speed = Field(description="largest rolling speed, m/s")
+    max_acceleration: Acceleration | None = Field(None, description="m/s²")
+    heading_deg: Degrees = Field(0.0, description="rolling direction δ")
+
+    @property
+    def heading(self) -> float:
+        """Rolling direction δ, rad."""
+        return math.radians(self.heading_deg)
+
+
+class MecanumWheel(_RollerWheel):
+    """A Mecanum wheel: rollers at an angle to the axle."""
+
+    type: Literal["mecanum"] = "mecanum"
+    roller_deg: RollerDegrees = Field(
+        description="angle γ from the rolling direction to the driven direction; ±45"
+    )
+
+    @property
+    def roller(self) -> float:
+        """Roller angle γ, rad."""
+        return math.radians(self.roller_deg)
+
+
+class OmniWheel(_RollerWheel):
+    """An omni wheel: a Mecanum wheel with γ = 0."""
+
+    type: Literal["omni"] = "omni"
+
+    @property
+    def roller(self) -> float:
+        """Roller angle γ, rad: 0."""
+        return 0.0
+
+
+class Castor(_PlacedWheel):
+    """A passive castor: carries load, constrains nothing."""
+
+    type: Literal["castor"] = "castor"
+
+
+Wheel: TypeAlias = Annotated[
+    SteeredWheel | FixedWheel | MecanumWheel | OmniWheel | Castor,
+    Field(discriminator="type"),
+]
+
+
+class Limits(_Model):
+    """Limits of the whole vehicle; a missing limit is no limit."""
+
+    max_speed: Speed | None = Field(None, description="speed of K, m/s")
+    max_reverse_speed: Speed | None = Field(
+        None, description="speed of K where v_n < 0, m/s; max_speed holds as well"
+    )
+    max_yaw_rate_deg: DegreeRate | None = Field(None, description="|ω|, degrees/s")
+    max_lateral_acceleration: Acceleration | None = Field(
+        None, description="centripetal acceleration |v ω| of K, m/s²"
+    )
+    max_acceleration: Acceleration | None = Field(
+        None, description="increase of the speed of K, m/s²"
+    )
+    max_deceleration: Acceleration | None = Field(
+        None, description="decrease of the speed of K, m/s²"
+    )
+
+
+Point: TypeAlias = tuple[Metres, Metres]
+
+
+class Vehicle(_Model):
+    """One vehicle type. Build one with `load_vehicle`."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,63}$")
+    description: str = Field("", max_length=2000)
+    source: str = Field("", max_length=2000, description="where the numbers come from")
+    reference_point: Point | None = Field(
+        None, description="K in the file's frame, m; default the origin"
+    )
+    kappa_g: Curvature | None = Field(
+        None, description="boundary curvature, 1/m; default as in section 3.2"
+    )
+    footprint: tuple[Point, ...] = Field((), description="polygon, m, in file's frame")
+    wheels: tuple[Wheel, ...] = Field(min_length=1, max_length=1000)
+    limits: Limits = Limits()
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Vehicle:
+        repeated = [i for i, n in Counter(w.id for w in self.wheels).items() if n > 1]
+        if repeated:
+            raise PydanticCustomError(
+                "wheel_ids", f"wheels: id {', '.join(repeated)} is used more than once"
+            )
+        if 0 < len(self.footprint) < 3:
+            raise PydanticCustomError(
+                "footprint", "footprint: a polygon needs at least three points"
+            )
+        self._mobility_and_curvature()
+        return self
+
+    def _mobility_and_curvature(self) -> None:
+        try:
+            mobility = self.mobility
+        except ValueError as error:
+            raise PydanticCustomError("mobility", str(error).replace("{", "(")) from None
+        if self.kappa_g is None and self._farthest(mobility) == 0:
+            raise PydanticCustomError(
+                "kappa_g",
+                "kappa_g: all wheels stand at the reference point, so the boundary "
+                "curvature must be given (1/m)",
+            )
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Reference point K and, for a line-mobile vehicle, the constant β."""
+        places = [
+            WheelPlace(
+                id=w.id,
+                type=w.type,
+                position=w.position,
+                heading=getattr(w, "heading", 0.0),
+                driven=getattr(w, "max_speed", None) is not None,
+            )
+            for w in self.wheels
+        ]
+        x, y = self.reference_point or (0.0, 0.0)
+        return mobility_of(places, complex(x, y))
+
+    @property
+    def reference(self) -> complex:
+        """Reference point K in the file's frame, m."""
+        return self.mobility.reference
+
+    @cached_property
+    def boundary_curvature(self) -> float:
+        """Boundary curvature κ_g, 1/m, as given or by section 3.2 of the paper."""
+        return self.kappa_g or 1.0 / self._farthest(self.mobility)
+
+    def _farthest(self, mobility: Mobility) -> float:
+        """Return |w_i*| of the wheel with the largest |w_i| / u_lim,i."""
+        rolling = [w for w in self.wheels if not isinstance(w, Castor)]
+        speeds = [w.max_speed for w in rolling]
+        by_speed = not any(isinstance(w, MecanumWheel | OmniWheel) for w in rolling)
+        weights = [
+            abs(w.position - mobility.reference)
+            / (u if by_speed and u is not None else 1.0)
+            if u is not None or not by_speed or not any(speeds)
+            else 0.0
+            for w, u in zip(rolling, speeds, strict=True)
+        ]
+        star = max(range(len(rolling)), key=weights.__getitem__)
+        return abs(rolling[star].position - mobility.reference)

@@ -1,0 +1,200 @@
+"""Reading vehicle files and the catalogue."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterator, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from configspace.errors import InvalidVehicle, Problem
+from configspace.vehicle import (
+    Castor,
+    FixedWheel,
+    Limits,
+    MecanumWheel,
+    OmniWheel,
+    SteeredWheel,
+    Vehicle,
+)
+
+__all__ = ["catalog", "load_vehicle", "parse_vehicle", "vehicle_schema"]
+
+_WHEELS: dict[str, type[BaseModel]] = {
+    "steered": SteeredWheel,
+    "fixed": FixedWheel,
+    "mecanum": MecanumWheel,
+    "omni": OmniWheel,
+    "castor": Castor,
+}
+
+
+def catalog() -> tuple[str, ...]:
+    """Return the names of the ready vehicles, sorted.
+
+    Examples
+    --------
+    >>> "ift-four-steered" in catalog()
+    True
+    """
+    folder = resources.files("configspace") / "catalog"
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".yaml")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".yaml")
+        )
+    )
+
+
+def load_vehicle(name: str | Path) -> Vehicle:
+    """Read a vehicle.
+
+    Parameters
+    ----------
+    name : str or Path
+        A name of the `catalog`, or the path of a YAML or JSON file.
+
+    Raises
+    ------
+    InvalidVehicle
+        If there is no such vehicle or the file has mistakes; all are reported at once.
+
+    Examples
+    --------
+    >>> round(load_vehicle("ift-four-steered").boundary_curvature, 4)
+    4.1013
+    """
+    if isinstance(name, str) and name in catalog():
+        text = (resources.files("configspace") / "catalog" / f"{name}.yaml").read_text(
+            "utf-8"
+        )
+        return parse_vehicle(text, subject=f"catalogue vehicle {name}")
+    path = Path(name)
+    try:
+        text = path.read_text("utf-8")
+    except FileNotFoundError as error:
+        known = ", ".join(catalog())
+        raise InvalidVehicle(
+            Problem(
+                "vehicle", f"no file {name!s}", f"a path or a catalogue name ({known})"
+            )
+        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidVehicle(
+            Problem("vehicle", f"{name!s}: {error}", "a readable UTF-8 text file")
+        ) from error
+    return parse_vehicle(text, subject=f"vehicle file {path}")
+
+
+def parse_vehicle(text: str, subject: str = "vehicle") -> Vehicle:
+    """Return the vehicle described by YAML or JSON text.
+
+    Raises
+    ------
+    InvalidVehicle
+        With every mistake of the text, each with its path.
+    """
+    return vehicle_from_data(_parse_yaml(text, subject), subject)
+
+
+def vehicle_from_data(data: object, subject: str = "vehicle") -> Vehicle:
+    """Return the vehicle described by plain data, as a message or file holds it."""
+    if not isinstance(data, dict):
+        problem = Problem(
+            "the text", type(data).__name__, "a mapping with name and wheels"
+        )
+        raise InvalidVehicle(problem, subject)
+    try:
+        # JSON mode: lists are tuples, everything else stays strict.
+        return Vehicle.model_validate_json(json.dumps(data, default=str))
+    except ValidationError as error:
+        raise InvalidVehicle(map(_problem, error.errors()), subject) from error
+
+
+def vehicle_schema() -> dict[str, Any]:
+    """Return the JSON Schema of vehicle files."""
+    return Vehicle.model_json_schema()
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML 1.1 without silently repeated keys."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+        """Return the mapping, or raise on a repeated key."""
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+            if isinstance(key, str) and key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key!r} stands twice", key_node.start_mark
+                )
+            if isinstance(key, str):
+                seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def _parse_yaml(text: str, subject: str) -> object:
+    try:
+        return yaml.load(text, Loader=_Loader)  # noqa: S506 - _Loader is a SafeLoader
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "text"
+        reason = getattr(error, "problem", None) or str(error)[:200]
+        problem = Problem(where, str(reason), "YAML or JSON is needed")
+        raise InvalidVehicle(problem, subject) from error
+
+
+def _problem(error: ErrorDetails) -> Problem:
+    """Word one pydantic error: where, given, allowed."""
+    location = [part for part in error["loc"] if part not in _WHEELS]
+    where = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part}" for part in location
+    ).lstrip(".")
+    given = error.get("input")
+    shown = "missing" if error["type"] == "missing" else _shorten(given)
+    match error["type"]:
+        case "extra_forbidden":
+            return Problem(where, "unknown key", _suggestion(error))
+        case "missing":
+            return Problem(where, "missing", "must be given")
+        case "wheel_ids" | "mobility" | "kappa_g" | "footprint" | "steering_range":
+            head, _, rest = error["msg"].partition(": ")
+            prefix = f"{where}." if where else ""
+            return Problem(prefix + head, rest, "see docs/vehicle-file.md")
+        case _:
+            return Problem(where or "vehicle", shown, _lower_first(error["msg"]))
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def _shorten(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _suggestion(error: ErrorDetails) -> str:
+    allowed = list(_allowed_keys(error["loc"]))
+    unknown = str(error["loc"][-1])
+    close = difflib.get_close_matches(unknown, allowed, n=1, cutoff=0.6)
+    hint = f"did you mean {close[0]}? " if close else ""
+    return f"{hint}allowed are {', '.join(allowed)}"
+
+
+def _allowed_keys(location: tuple[int | str, ...]) -> Iterator[str]:
+    model: type[BaseModel] = Vehicle
+    for part in location[:-1]:
+        if part in _WHEELS:
+            model = _WHEELS[str(part)]
+        elif part == "limits":
+            model = Limits
+    fields: Mapping[str, object] = model.model_fields
+    return iter(fields)

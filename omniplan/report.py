@@ -1,0 +1,145 @@
+"""Verdicts: what `validate` and `select` answer, as plain frozen values.
+
+"No" is a value. Every report can be turned into plain data and back, which is how it
+travels over the service.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+__all__ = ["Advice", "Candidate", "Ranking", "Report", "Violation"]
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One limit that one wheel (or the vehicle) breaks over one stretch of time."""
+
+    limit: str
+    """Which limit: ``STEER_RANGE``, ``SINGULAR``, ``WHEEL_SPEED``, ``SPEED``,
+    ``YAW_RATE``, ``LATERAL_ACCELERATION``, ``FIXED_WHEEL``, ``STEER_RATE``,
+    ``WHEEL_ACCELERATION``, ``ACCELERATION``, ``DECELERATION``, ``RECONFIGURATION`` or
+    ``BLOCKED`` (only a data sheet at hand)."""
+    wheel: str | None
+    """Id of the wheel; None for the vehicle as a whole."""
+    value: float
+    """The worst value; for a proved violation it is really taken."""
+    bound: float
+    """What is permitted."""
+    unit: str
+    """Unit of value and bound; angles are in rad."""
+    index: int
+    """Row of the last sample at or before the worst place."""
+    t: float
+    """Time of the worst place, s."""
+    t_start: float
+    """Start of the stretch, s."""
+    t_end: float
+    """End of the stretch, s."""
+    kappa_n: float
+    """Nominal curvature at the worst place, for this vehicle."""
+    beta: float
+    """Side-slip angle at the worst place, rad."""
+    pose: tuple[float, float, float] | None
+    """Pose at the worst place (m, m, rad), where the trajectory has poses."""
+    is_proved: bool
+    """True if the value is taken; False if the limit could only not be shown to hold
+    within the stated resolution."""
+
+    def __str__(self) -> str:
+        """Return one line with wheel, limit, place and numbers."""
+        from omniplan.wording import describe
+
+        return describe(self)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What would make the trajectory valid; it was checked by validating again."""
+
+    kind: str
+    """``slow_down``: drive it slower by `value` all along."""
+    value: float
+    """For ``slow_down``: the factor on the speed, below 1."""
+    text: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """The verdict on one trajectory for one vehicle."""
+
+    vehicle: str
+    trajectory: str
+    valid: bool
+    violations: tuple[Violation, ...]
+    margin: float
+    """1 - worst (value / bound) over all limits that have a bound: how much is left, at
+    least; negative where a limit is broken."""
+    tightest: str
+    """Which limit, and wheel, the margin belongs to."""
+    duration: float
+    """Duration as given, s."""
+    speed_factor: float
+    """The largest factor by which the whole trajectory may be driven faster, proved;
+    below 1 it must be driven slower; 0 if no factor helps."""
+    fastest_duration: float | None
+    """``duration / speed_factor``, s; None if no factor helps."""
+    top_speed: float
+    """Largest speed of the vehicle's K along the trajectory as given, m/s."""
+    advice: tuple[Advice, ...]
+    interpolation: str
+    """How the motion between the samples is understood."""
+    not_judged: tuple[str, ...]
+    """Limits the vehicle declares that were not judged; normally none."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain data (JSON types only)."""
+        data: dict[str, Any] = _REPORT.dump_python(self, mode="json")
+        return data
+
+    @classmethod
+    def from_dict(cls, data: object) -> Report:
+        """Return the report that plain data describes; ValueError if it does not."""
+        return _REPORT.validate_python(data)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One vehicle for one trajectory."""
+
+    vehicle: str
+    score: float
+    """Value of the criterion, smaller is better."""
+    report: Report
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Who can drive a trajectory, best first, and why the others cannot."""
+
+    trajectory: str
+    criterion: str
+    suitable: tuple[Candidate, ...]
+    refused: tuple[Report, ...]
+
+    @property
+    def best(self) -> Candidate | None:
+        """The best vehicle, None if no vehicle can."""
+        return self.suitable[0] if self.suitable else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the ranking as plain data (JSON types only)."""
+        data: dict[str, Any] = _RANKING.dump_python(self, mode="json")
+        return data
+
+    @classmethod
+    def from_dict(cls, data: object) -> Ranking:
+        """Return the ranking that plain data describes; ValueError if it does not."""
+        return _RANKING.validate_python(data)
+
+
+_REPORT: TypeAdapter[Report] = TypeAdapter(Report)
+_RANKING: TypeAdapter[Ranking] = TypeAdapter(Ranking)
