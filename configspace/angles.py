@@ -21,6 +21,8 @@ def wrap(angle: npt.ArrayLike) -> npt.NDArray[np.float64]:
     array([ 0. ,  1. , -0.5])
     """
     angle = np.asarray(angle, dtype=np.float64)
-    wrapped = np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    # Sine and cosine reduce by the true π, also where an angle counts many turns.
+    wrapped = np.arctan2(np.sin(angle), np.cos(angle))
+    wrapped = np.where(wrapped <= -np.pi, np.pi, wrapped)
     # An angle that is in range already is returned to the last bit.
     return np.where((angle > -np.pi) & (angle <= np.pi), angle, wrapped)

@@ -34,7 +34,7 @@ def read(folder: Path, vehicle: Vehicle, grid: Grid) -> PermissibleSpace | None:
     """Return the cached space, or None if there is no sound one."""
     key = fingerprint(vehicle, grid)
     path = folder / f"{key}.safetensors"
-    if not path.exists():
+    if not os.path.exists(path):  # unlike Path.exists: False where it may not look
         return None
     try:
         space = load_space(path)

@@ -56,7 +56,9 @@ class InvalidInput(OmniplanError, ValueError):
         What was read, such as ``vehicle file agv.yaml``.
     """
 
-    def __init__(self, problems: Problem | Iterable[Problem], subject: str = "") -> None:
+    def __init__(
+        self, problems: Problem | Iterable[Problem], subject: str = ""
+    ) -> None:
         self.problems: tuple[Problem, ...] = (
             (problems,) if isinstance(problems, Problem) else tuple(problems)
         )

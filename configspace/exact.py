@@ -94,11 +94,11 @@ def exact_reason(
     loads, sectors = rows_of(vehicle)
     blocked, why, who = _blocked(vehicle, sectors, c, s, e)
     values = [(row, load_of(row, c, s, e)) for row in active_rows(loads, reverse)]
-    worst = np.maximum.reduce([value for _, value in values])
+    worst = np.maximum.reduce([np.zeros(c.shape), *(value for _, value in values)])
     bind_why = np.zeros(c.shape, np.uint16)
     bind_who = np.full(c.shape, -1, np.int16)
     for row, value in reversed(values):
-        hit = value >= worst * (1 - 1e-12)
+        hit = (value >= worst * (1 - 1e-12)) & (worst > 0)
         bind_why = np.where(hit, bind_why | np.uint16(row.reason), bind_why)
         bind_who = np.where(hit, np.int16(row.wheel), bind_who)
     return np.where(blocked, why, bind_why), np.where(blocked, who, bind_who)
@@ -137,7 +137,8 @@ def largest_load(
     e: npt.NDArray[np.complex128],
 ) -> FloatArray:
     """Return the largest squared load of all rows."""
-    return np.asarray(np.maximum.reduce([load_of(row, c, s, e) for row in rows]))
+    loads = [load_of(row, c, s, e) for row in rows]
+    return np.asarray(np.maximum.reduce([np.zeros(c.shape), *loads]))
 
 
 def _blocked(

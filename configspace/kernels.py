@@ -31,7 +31,7 @@ _REASON_STEER, _REASON_SINGULAR = 1, 2
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _cos_range(e0: complex, e1: complex, n: complex) -> tuple[float, float]:
     """Least and largest |n| cos(β - arg n) for β from arg e0 to arg e1, < π apart."""
     at0 = e0.real * n.real + e0.imag * n.imag
@@ -49,7 +49,7 @@ def _cos_range(e0: complex, e1: complex, n: complex) -> tuple[float, float]:
     return low, high
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _functional_range(
     c0: float, s0: float, c1: float, s1: float, low: float, high: float, h: float
 ) -> tuple[float, float]:
@@ -59,9 +59,16 @@ def _functional_range(
     return least, largest
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _disc_range(
-    c0: float, s0: float, c1: float, s1: float, p: float, bb: float, low: float, high: float
+    c0: float,
+    s0: float,
+    c1: float,
+    s1: float,
+    p: float,
+    bb: float,
+    low: float,
+    high: float,
 ) -> tuple[float, float]:
     """Least and largest squared disc; `low`, `high` bound ``p Re(e^{jβ} b̄)``."""
     far, near = (high, low) if s0 + s1 > 0 else (low, high)
@@ -78,10 +85,11 @@ def _disc_range(
     tau = min(1.0, max(0.0, -b / a)) if a > 0 else 0.0
     least = (a * tau + 2 * b) * tau + c
     end = a + 2 * b + c
-    return max(0.0, min(least, end)), largest
+    least = max(0.0, min(least, end))
+    return least, largest
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _load_range(
     kind: int,
     p: float,
@@ -110,7 +118,7 @@ def _load_range(
     return min(at0, at1), max(at0, at1)
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _sector_state(
     b: complex,
     middle: complex,
@@ -173,7 +181,7 @@ def _sector_state(
     return BLOCKED
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def node_loads(
     c: Array, s: Array, e: Array, kind: Array, p: Array, b: Array, n: Array, pad: Array
 ) -> Array:
@@ -213,7 +221,7 @@ def node_loads(
     return out
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def cell_bounds(
     c: Array,
     s: Array,

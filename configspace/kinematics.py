@@ -40,7 +40,7 @@ def wheel_directions(
     w = np.array([wheel.position - vehicle.reference for wheel in vehicle.wheels])
     translation = np.asarray(c * np.exp(1j * finite("beta", beta, "rad")))
     rotation = np.asarray(1j * s * vehicle.boundary_curvature)
-    return translation[..., None] + rotation[..., None] * w
+    return np.asarray(translation[..., None] + rotation[..., None] * w)
 
 
 def wheel_states(

@@ -67,9 +67,9 @@ class LoadRow:
     reason: Reason
     kind: Kind
     p: float
-    """Factor of the translation, per limit: 1/(m/s), or for a product sqrt(1/(m/s)²)."""
+    """Factor of the translation, 1/(m/s)."""
     b: complex = 0j
-    """Factor of the rotation, per limit: 1/(m/s)."""
+    """Factor of the rotation, 1/(m/s)."""
     nu: float = 0.0
     """Direction of a strip, rad."""
     wheel: int = -1

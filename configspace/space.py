@@ -289,7 +289,7 @@ class PermissibleSpace:
         """
         load = self.tables.load[self._direction(reverse)]
         state = self.tables.state
-        rows, columns = state.shape
+        _rows, columns = state.shape
         k0, f0 = self._row(kappa_low)
         k1, f1 = self._row(kappa_high)
         if columns == 1:
@@ -307,33 +307,26 @@ class PermissibleSpace:
         corners = [state[k0, left], state[k0, right], state[k1, left], state[k1, right]]
         all_free = np.all([x == FREE for x in corners], axis=0)
         all_blocked = np.all([x == BLOCKED for x in corners], axis=0)
-        # Inside one cell the interpolant of a box is largest at the box's corners;
-        # across cells the largest node of all of them bounds it.
-        inside = (k0 == k1) & (m0 == m1)
-        at_corners = np.max(
+        # A bilinear function is largest at a corner of a box; an edge between two
+        # cells divides the box, so it counts as a corner from either side.
+        over_k, over_m = (k1 > k0).astype(float), (m1 > m0).astype(float)
+        rows_at = ((k0, f0), (k0, np.where(k1 > k0, over_k, f1)), (k1, f1))
+        columns_at = ((left, g0), (left, np.where(m1 > m0, over_m, g1)), (right, g1))
+        worst = np.max(
             [
-                _bilinear(load, k0, left, x, y)
-                for x, y in ((f0, g0), (f0, g1), (f1, g0), (f1, g1))
+                _bilinear(load, row, column, x, y)
+                for row, x in rows_at
+                for column, y in columns_at
             ],
             axis=0,
         )
-        at_nodes = np.max(
-            [
-                load[k + i, m + j]
-                for k in (k0, k1)
-                for m in (left, right)
-                for i in (0, 1)
-                for j in (0, 1)
-            ],
-            axis=0,
-        )
-        worst = np.where(inside, at_corners, at_nodes)
         # A box over all β, as at the poles: whole rows of cells.
         ring = (k1 - k0 <= 1) & ~near
         row_free = (state == FREE).all(axis=1)
-        row_load = np.maximum(load[:-1].max(axis=1), load[1:].max(axis=1))
         all_free = np.where(ring, row_free[k0] & row_free[k1], all_free & near)
-        worst = np.where(ring, np.maximum(row_load[k0], row_load[k1]), worst)
+        ring_load = load.max(axis=1)
+        at_ring = [(1 - f) * ring_load[k] + f * ring_load[k + 1] for k, f in rows_at]
+        worst = np.where(ring, np.max(at_ring, axis=0), worst)
         answer = np.full(k0.shape, MIXED, np.uint8)
         answer[all_free] = FREE
         answer[all_blocked & near] = BLOCKED
@@ -357,6 +350,8 @@ class PermissibleSpace:
         kappa_n, beta = np.broadcast_arrays(
             nominal_curvature(kappa_n), finite("beta", beta, "rad")
         )
+        if (np.abs(beta) > np.pi).any():
+            beta = wrap(beta)
         return kappa_n, beta
 
     def _direction(self, reverse: bool) -> Literal[0, 1]:

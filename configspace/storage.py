@@ -17,6 +17,8 @@ from safetensors import numpy as safetensors
 
 from configspace.errors import CacheError
 from configspace.grid import Grid
+from configspace.kernels import MIXED
+from configspace.omni_curve import boundary_curvature
 from configspace.space import (
     ALGORITHM_VERSION,
     FORMAT_VERSION,
@@ -122,7 +124,8 @@ def parse_space(content: bytes, subject: str = "data sheet") -> PermissibleSpace
     try:
         header = _header(header_text)
         tables = Tables(**{name: tensors[name] for name in _DTYPES})
-    except (KeyError, TypeError, ValueError) as error:
+        _reject_impossible(header, tables)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CacheError(f"{subject}: damaged: {error!r}") from error
     return PermissibleSpace(header=header, tables=tables)
 
@@ -151,6 +154,40 @@ def _header(text: str) -> SheetHeader:
             "wheel_ids": tuple(data["wheel_ids"]),
         }
     )
+
+
+def _reject_impossible(header: SheetHeader, tables: Tables) -> None:
+    """Raise ValueError unless tables and header fit: a sheet may be a stranger's."""
+    rows = header.grid.n_kappa
+    columns = header.grid.n_beta if header.line_beta is None else 1
+    directions = tables.load.shape[0] if tables.load.ndim else 0
+    if directions not in (1, 2):
+        raise ValueError(f"{directions} driving directions")
+    cells = (directions, rows, columns)
+    shapes = {
+        "load": (directions, rows + 1, columns + 1),
+        "v_lo": cells,
+        "v_hi": cells,
+        "state": cells[1:],
+        "reason": cells,
+        "wheel": cells,
+    }
+    for name, dtype in _DTYPES.items():
+        array = getattr(tables, name)
+        if array.shape != shapes[name] or array.dtype != dtype:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}")
+    if not (np.isfinite(tables.load).all() and (tables.load > 0).all()):
+        raise ValueError("load must be finite and positive")
+    if not ((tables.v_lo >= 0) & (tables.v_lo <= tables.v_hi)).all():
+        raise ValueError("0 ≤ v_lo ≤ v_hi must hold")
+    if tables.state.max() > MIXED:
+        raise ValueError("a state of a cell is unknown")
+    if tables.wheel.min() < -1 or tables.wheel.max() >= len(header.wheel_ids):
+        raise ValueError("a wheel is unknown")
+    boundary_curvature(header.kappa_g)
+    numbers = (*header.reference, header.line_beta or 0.0)
+    if not np.isfinite(numbers).all():
+        raise ValueError("the header's numbers must be finite")
 
 
 def _checksum(header: str, tensors: dict[str, npt.NDArray[np.generic]]) -> str:

@@ -222,7 +222,9 @@ class Vehicle(_Model):
         try:
             mobility = self.mobility
         except ValueError as error:
-            raise PydanticCustomError("mobility", str(error).replace("{", "(")) from None
+            raise PydanticCustomError(
+                "mobility", str(error).replace("{", "(")
+            ) from None
         if self.kappa_g is None and self._farthest(mobility) == 0:
             raise PydanticCustomError(
                 "kappa_g",
@@ -268,5 +270,7 @@ class Vehicle(_Model):
             else 0.0
             for w, u in zip(rolling, speeds, strict=True)
         ]
+        if not any(weights):  # all that are driven stand at K
+            weights = [abs(w.position - mobility.reference) for w in rolling]
         star = max(range(len(rolling)), key=weights.__getitem__)
         return abs(rolling[star].position - mobility.reference)

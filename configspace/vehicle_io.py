@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
@@ -86,7 +88,10 @@ def load_vehicle(name: str | Path) -> Vehicle:
                 "vehicle", f"no file {name!s}", f"a path or a catalogue name ({known})"
             )
         ) from error
-    except (OSError, UnicodeDecodeError) as error:
+    except (
+        OSError,
+        ValueError,
+    ) as error:  # ValueError: not UTF-8, or a NUL in the name
         raise InvalidVehicle(
             Problem("vehicle", f"{name!s}: {error}", "a readable UTF-8 text file")
         ) from error
@@ -112,10 +117,15 @@ def vehicle_from_data(data: object, subject: str = "vehicle") -> Vehicle:
         )
         raise InvalidVehicle(problem, subject)
     try:
+        text = json.dumps(data, default=str)
+    except (TypeError, ValueError, RecursionError) as error:
+        problem = Problem("the text", str(error), "plain nested data is needed")
+        raise InvalidVehicle(problem, subject) from error
+    try:
         # JSON mode: lists are tuples, everything else stays strict.
-        return Vehicle.model_validate_json(json.dumps(data, default=str))
+        return Vehicle.model_validate_json(text)
     except ValidationError as error:
-        raise InvalidVehicle(map(_problem, error.errors()), subject) from error
+        raise InvalidVehicle(_problems(error.errors(), data), subject) from error
 
 
 def vehicle_schema() -> dict[str, Any]:
@@ -130,7 +140,7 @@ class _Loader(yaml.SafeLoader):
         """Return the mapping, or raise on a repeated key."""
         seen = set()
         for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+            key = self.construct_object(key_node, deep=True)
             if isinstance(key, str) and key in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"key {key!r} stands twice", key_node.start_mark
@@ -142,7 +152,7 @@ class _Loader(yaml.SafeLoader):
 
 def _parse_yaml(text: str, subject: str) -> object:
     try:
-        return yaml.load(text, Loader=_Loader)  # noqa: S506 - _Loader is a SafeLoader
+        return yaml.load(text, Loader=_Loader)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "text"
@@ -151,9 +161,41 @@ def _parse_yaml(text: str, subject: str) -> object:
         raise InvalidVehicle(problem, subject) from error
 
 
+# YAML 1.1 takes 1e-1, as JSON writers put it, for a text.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\.[0-9]+([eE][-+]?[0-9]+)?|[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+)$"),
+    list("-+.0123456789"),
+)
+
+
+def _problems(errors: list[ErrorDetails], data: dict[Any, Any]) -> Iterator[Problem]:
+    """Word all errors, and the repeated ids that pydantic looks for only at the end."""
+    wheels = data.get("wheels")
+    for error in errors:
+        # Wheels with mistakes are dropped, which pydantic reports as too few.
+        if not (
+            error["type"] == "too_short" and error["loc"] == ("wheels",) and wheels
+        ):
+            yield _problem(error)
+    if isinstance(wheels, list) and all(e["type"] != "wheel_ids" for e in errors):
+        ids = [w["id"] for w in wheels if isinstance(w, dict) and "id" in w]
+        counts = Counter(name for name in ids if isinstance(name, str))
+        repeated = ", ".join(name for name, count in counts.items() if count > 1)
+        if repeated:
+            yield Problem("wheels", f"id {repeated}", "is used more than once")
+
+
+def _without_tags(location: tuple[int | str, ...]) -> Iterator[int | str]:
+    """Yield a location without the wheel type that pydantic puts after the index."""
+    for i, part in enumerate(location):
+        if not (i == 2 and location[0] == "wheels" and part in _WHEELS):
+            yield part
+
+
 def _problem(error: ErrorDetails) -> Problem:
     """Word one pydantic error: where, given, allowed."""
-    location = [part for part in error["loc"] if part not in _WHEELS]
+    location = _without_tags(error["loc"])
     where = "".join(
         f"[{part}]" if isinstance(part, int) else f".{part}" for part in location
     ).lstrip(".")

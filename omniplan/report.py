@@ -6,6 +6,7 @@ travels over the service.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,14 +20,15 @@ class Violation:
     """One limit that one wheel (or the vehicle) breaks over one stretch of time."""
 
     limit: str
-    """Which limit: ``STEER_RANGE``, ``SINGULAR``, ``WHEEL_SPEED``, ``SPEED``,
-    ``YAW_RATE``, ``LATERAL_ACCELERATION``, ``FIXED_WHEEL``, ``STEER_RATE``,
-    ``WHEEL_ACCELERATION``, ``ACCELERATION``, ``DECELERATION``, ``RECONFIGURATION`` or
-    ``BLOCKED`` (only a data sheet at hand)."""
+    """Which limit: a name of `configspace.Reason`, or ``REVERSE_SPEED``,
+    ``STEER_RATE``, ``WHEEL_ACCELERATION``, ``ACCELERATION``, ``DECELERATION``,
+    ``RECONFIGURATION``; the last is a standstill too short to turn the wheels, value
+    and bound in s."""
     wheel: str | None
     """Id of the wheel; None for the vehicle as a whole."""
-    value: float
-    """The worst value; for a proved violation it is really taken."""
+    value: float | None
+    """The worst value; for a proved violation it is really taken. None for a
+    ``RECONFIGURATION`` for which no way inside the space was found."""
     bound: float
     """What is permitted."""
     unit: str
@@ -49,6 +51,13 @@ class Violation:
     """True if the value is taken; False if the limit could only not be shown to hold
     within the stated resolution."""
 
+    @property
+    def excess(self) -> float:
+        """``|value / bound|``; infinite where the bound is 0 or there is no value."""
+        if self.value is None or self.bound == 0:
+            return math.inf
+        return abs(self.value / self.bound)
+
     def __str__(self) -> str:
         """Return one line with wheel, limit, place and numbers."""
         from omniplan.wording import describe
@@ -61,9 +70,9 @@ class Advice:
     """What would make the trajectory valid; it was checked by validating again."""
 
     kind: str
-    """``slow_down``: drive it slower by `value` all along."""
+    """``slow_down``: drive it slower all along; ``dwell``: stand still longer."""
     value: float
-    """For ``slow_down``: the factor on the speed, below 1."""
+    """``slow_down``: the factor on the speed, below 1; ``dwell``: seconds in all."""
     text: str
 
 
@@ -89,11 +98,21 @@ class Report:
     """``duration / speed_factor``, s; None if no factor helps."""
     top_speed: float
     """Largest speed of the vehicle's K along the trajectory as given, m/s."""
+    top_yaw_rate: float
+    """Largest |ω| along the trajectory as given, rad/s."""
     advice: tuple[Advice, ...]
     interpolation: str
     """How the motion between the samples is understood."""
     not_judged: tuple[str, ...]
     """Limits the vehicle declares that were not judged; normally none."""
+
+    @property
+    def headline(self) -> Violation | None:
+        """The most telling violation, None if valid.
+
+        Proved ones first, then what no other speed would mend, then the largest excess.
+        """
+        return min(self.violations, key=_telling, default=None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as plain data (JSON types only)."""
@@ -139,6 +158,15 @@ class Ranking:
     def from_dict(cls, data: object) -> Ranking:
         """Return the ranking that plain data describes; ValueError if it does not."""
         return _RANKING.validate_python(data)
+
+
+_SHAPE_LIMITS = ("SINGULAR", "STEER_RANGE", "FIXED_WHEEL", "RECONFIGURATION")
+"""Limits of the configuration, which driving slower does not mend."""
+
+
+def _telling(violation: Violation) -> tuple[bool, int, float, float]:
+    order = (*_SHAPE_LIMITS, violation.limit).index(violation.limit)
+    return (not violation.is_proved, order, -violation.excess, violation.t)
 
 
 _REPORT: TypeAdapter[Report] = TypeAdapter(Report)

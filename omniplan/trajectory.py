@@ -3,8 +3,8 @@
 Three forms, each with its interpolation:
 
 ======================  ====================================================
-poses (x, y, θ)         C² cubic splines of x, y and the unwrapped heading; at a cusp or a
-                        standstill the speed is zero and the spline starts anew
+poses (x, y, θ)         C² cubic splines of x, y and the unwrapped heading; at a
+                        cusp or standstill the speed is 0 and a new one starts
 twists (vx, vy, ω)      linear in the body twist
 (κ_n, β, v_n)           linear, β the shorter way round; a straight piece in the plane
 ======================  ====================================================
@@ -220,6 +220,36 @@ class Trajectory:
             self.vehicle,
         )
 
+    def with_dwell(self, row: int, seconds: float) -> Trajectory:
+        """Return the trajectory with a standstill added after a row of poses.
+
+        Parameters
+        ----------
+        row : int
+        seconds : float, s, > 0
+
+        Raises
+        ------
+        InvalidTrajectory
+            If the samples are not poses, or row or time are out of range.
+        """
+        if self.form != "poses" or not 0 <= row < self.t.size or not seconds > 0:
+            raise InvalidTrajectory(
+                Problem(
+                    self.name,
+                    f"a standstill of {seconds} s after row {row} of {self.form}",
+                    f"poses, a row from 0 to {self.t.size - 1}, a positive time",
+                )
+            )
+        t = self.t + np.where(np.arange(self.t.size) > row, seconds, 0.0)
+        return Trajectory(
+            self.name,
+            self.form,
+            _locked(np.insert(t, row + 1, self.t[row] + seconds)),
+            _locked(np.insert(self.samples, row + 1, self.samples[row], axis=0)),
+            self.reference_point,
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return the trajectory as plain data (JSON types only)."""
         data: dict[str, Any] = {
@@ -264,8 +294,9 @@ class Trajectory:
         form = forms[0]
         if form == "omni_curve":
             vehicle = vehicle_from_data(data.get("vehicle"), f"{name}: vehicle")
-            _, samples = _checked(name, data["t"], data[form], COLUMNS[form])
-            return cls.from_omni_curve(data["t"], *samples.T, vehicle, name=name)
+            times, samples = _checked(name, data["t"], data[form], COLUMNS[form])
+            kappa_n, beta, v_n = samples.T
+            return cls.from_omni_curve(times, kappa_n, beta, v_n, vehicle, name=name)
         point = _point(name, data.get("reference_point", (0.0, 0.0)))
         build = cls.from_poses if form == "poses" else cls.from_twists
         return build(data["t"], data[form], name=name, reference_point=point)
@@ -279,7 +310,9 @@ def _point(name: str, value: object) -> tuple[float, float]:
     except (TypeError, ValueError):
         pass
     raise InvalidTrajectory(
-        Problem(f"{name}: reference_point", repr(value)[:60], "two finite numbers, in m")
+        Problem(
+            f"{name}: reference_point", repr(value)[:60], "two finite numbers, in m"
+        )
     )
 
 

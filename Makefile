@@ -1,0 +1,66 @@
+# Every target sets up what it needs: a virtual environment in .venv.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+TESTS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-fast test-slow check format fix lint types layers \
+        examples bench docs clean
+
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
+	  awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+$(VENV)/.run: pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+setup: $(VENV)/.dev ## make the virtual environment with all tools
+
+demo: $(VENV)/.run ## judge a mixed fleet over zenoh; pictures in demo-output/
+	$(BIN)/omniplan demo
+
+test: $(VENV)/.dev ## all checks and tests but the slow ones; what CI runs
+	$(MAKE) --no-print-directory check
+
+check: $(VENV)/.dev lint types layers examples ## format, lint, types, layers, examples, tests
+	$(BIN)/python -m pytest -m "not slow" $(TESTS)
+
+test-fast: $(VENV)/.dev ## unit tests only
+	$(BIN)/python -m pytest -m "not slow" tests/unit $(TESTS)
+
+test-slow: $(VENV)/.dev ## long soundness runs
+	$(BIN)/python -m pytest -m slow --timeout 3600 $(TESTS)
+
+format fix: $(VENV)/.dev ## format and mend what the linter can
+	$(BIN)/ruff check --quiet --fix . ; $(BIN)/ruff format .
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+types: $(VENV)/.dev
+	$(BIN)/mypy
+
+layers: $(VENV)/.dev
+	$(BIN)/lint-imports
+
+examples: $(VENV)/.dev ## run every example
+	@for example in examples/*.py; do \
+	  echo "$$example"; $(BIN)/python -W error $$example > /dev/null || exit 1; done
+	@git diff --exit-code --stat -- examples/manoeuvres
+
+bench: $(VENV)/.dev ## measure; see benchmarks/README.md
+	$(BIN)/python -m pytest benchmarks --benchmark-only
+
+docs: $(VENV)/.dev ## draw the figures of docs/
+	$(BIN)/python docs/make_figures.py
+
+clean: ## remove the virtual environment and all caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache demo-output

@@ -1,0 +1,472 @@
+"""The continuous motion between the samples of a trajectory, with enclosures.
+
+A motion is cut at its knots into intervals. On a part ``[t0, t1]`` of an interval the
+body twist is ``scale · (v, ω)`` with
+
+    v(t) ∈ chord [v(t0), v(t1)] ⊕ disc of radius Δt²/8 · max |v̈|
+
+and likewise for ω. Everything `judge` decides between the samples rests on that
+enclosure, whose excess shrinks with the square of Δt.
+
+Twists are those of the origin of the vehicle files' frame, ``v = vx + j vy``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from configspace import Vehicle, exact_v_max
+from configspace.exact import active_rows
+from configspace.limits import rows_of
+from omniplan.trajectory import Trajectory
+import itertools
+
+__all__ = ["Enclosure", "Intervals", "Motion", "motion_of"]
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+IntArray = npt.NDArray[np.int64]
+
+STOP_TURN = np.radians(60)
+"""A path that turns by more than this from sample to sample must stop there."""
+REST_SHARE = 0.25
+"""A motion that starts at less than this share of its first step's speed starts at
+rest."""
+HEADING_LENGTH = 0.5
+"""Metres that one radian of heading counts in that comparison."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Parts of a motion, in order of time."""
+
+    knot: IntArray
+    """(m,) the interval each part belongs to."""
+    t0: FloatArray
+    """(m,) s."""
+    t1: FloatArray
+    """(m,) s."""
+
+    def halved(self, mask: npt.NDArray[np.bool_]) -> Intervals:
+        """Return the intervals with those of `mask` cut in two."""
+        half = (self.t0[mask] + self.t1[mask]) / 2
+        at = np.flatnonzero(mask)
+        t1 = self.t1.copy()
+        t1[at] = half
+        return Intervals(
+            np.insert(self.knot, at + 1, self.knot[at]),
+            np.insert(self.t0, at + 1, half),
+            np.insert(t1, at + 1, self.t1[at]),
+        )
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """The twist over m parts; 0 and 1 are their ends."""
+
+    dt: FloatArray
+    v0: ComplexArray
+    v1: ComplexArray
+    omega0: FloatArray
+    omega1: FloatArray
+    v_dot0: ComplexArray
+    v_dot1: ComplexArray
+    omega_dot0: FloatArray
+    omega_dot1: FloatArray
+    v_ddot: FloatArray
+    """Bound on |v̈|, per s²."""
+    omega_ddot: FloatArray
+    """Bound on |ω̈|, per s²."""
+    scale0: FloatArray
+    scale1: FloatArray
+    scale_high: FloatArray
+    """Bound on the factor on the twist over the part, ≥ 0."""
+    sign: FloatArray
+    """Sign of v_s of the configuration that is meant (omni_curve), else 1."""
+
+
+class Motion(Protocol):
+    """What `judge` needs to know of a motion."""
+
+    is_own: bool
+    """The samples are this vehicle's own (κ_n, β, v_n): the configuration is given and
+    the factor on the twist is |v_n|, a share of v_max."""
+    has_rates: bool
+    """Whether accelerations are known."""
+    interpolation: str
+
+    def intervals(self) -> Intervals:
+        """Return the intervals between the knots."""
+        ...
+
+    def enclose(self, parts: Intervals) -> Enclosure:
+        """Return an enclosure of every part."""
+        ...
+
+
+def motion_of(trajectory: Trajectory, *, is_own: bool) -> Motion:
+    """Return the motion of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    is_own : bool
+        Whether the vehicle that is judged is the trajectory's own: then its
+        Omni-Curve-Parameters are taken as they are, otherwise as twists.
+    """
+    point = complex(*trajectory.reference_point)
+    if trajectory.form == "poses":
+        return PoseMotion(trajectory.t, trajectory.samples, point)
+    if trajectory.form == "twists":
+        return TwistMotion(trajectory.t, trajectory.samples, point)
+    owner = trajectory.vehicle
+    assert owner is not None
+    return OmniCurveMotion(
+        trajectory.t,
+        trajectory.samples,
+        owner.boundary_curvature,
+        owner.reference,
+        None if is_own else owner,
+    )
+
+
+def stops_of(samples: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which pose samples are standstills: cusps, corners and dwells.
+
+    Parameters
+    ----------
+    samples : (n, 3) float, m, m, rad
+
+    Returns
+    -------
+    is_stop : (n,) bool
+    """
+    chord = np.diff(samples, axis=0) * [1.0, 1.0, HEADING_LENGTH]
+    length = np.linalg.norm(chord, axis=1)
+    still = length < 1e-9
+    stop = np.zeros(len(samples), dtype=bool)
+    stop[:-1] |= still
+    stop[1:] |= still
+    dot = np.einsum("ij,ij->i", chord[:-1], chord[1:])
+    sharp = dot < np.cos(STOP_TURN) * length[:-1] * length[1:]
+    stop[1:-1] |= sharp & ~still[:-1] & ~still[1:]
+    return stop
+
+
+def starts_at_rest(t: FloatArray, samples: FloatArray) -> bool:
+    """Return whether samples leave their first one from rest.
+
+    The speed there, by the parabola through three samples, is far below that of the
+    first step. A spline with a free end would swing backwards before such a start.
+    """
+    if len(t) < 3:
+        return False
+    chord = np.diff(samples[:3], axis=0) * [1.0, 1.0, HEADING_LENGTH]
+    first, second = chord / np.diff(t[:3])[:, None]
+    share = (t[1] - t[0]) / (t[2] - t[0])
+    at_start = first - share * (second - first)
+    return bool(at_start @ first < REST_SHARE * (first @ first))
+
+
+class PoseMotion:
+    """Cubic splines through poses, at rest in every stop.
+
+    Between two stops position and heading are C²; at a stop they start anew with zero
+    speed, as a C² spline through a cusp would swing around it.
+    """
+
+    is_own = False
+    has_rates = True
+    interpolation = (
+        "C² cubic splines of x, y and heading; at rest at cusps, corners and dwells"
+    )
+
+    def __init__(self, t: FloatArray, samples: FloatArray, point: complex) -> None:
+        self._t = t
+        self._point = point
+        self._position = np.zeros((4, len(t) - 1), dtype=complex)
+        self._heading = np.zeros((4, len(t) - 1))
+        stop = stops_of(samples)
+        stop[0] |= starts_at_rest(t, samples)
+        stop[-1] |= starts_at_rest(-t[::-1], samples[::-1])
+        bounds = sorted({0, len(t) - 1, *np.flatnonzero(stop).tolist()})
+        for first, last in itertools.pairwise(bounds):
+            run = slice(first, last + 1)
+            ends = bool(stop[first]), bool(stop[last])
+            part = slice(first, last)
+            x, y = (_spline(t[run], samples[run, i], *ends) for i in (0, 1))
+            self._position[:, part] = x + 1j * y
+            self._heading[:, part] = _spline(t[run], samples[run, 2], *ends)
+
+    def intervals(self) -> Intervals:
+        """Return the intervals between the samples."""
+        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+
+    def poses_at(self, t: FloatArray) -> FloatArray:
+        """Return the poses at times t, (n, 3)."""
+        knot = np.clip(
+            np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2
+        )
+        p = _polynomial(self._position, knot, t - self._t[knot])[0]
+        heading = _polynomial(self._heading, knot, t - self._t[knot])[0]
+        return np.stack([p.real, p.imag, heading.real], axis=-1)
+
+    def _at(
+        self, knot: IntArray, t: FloatArray
+    ) -> tuple[ComplexArray, FloatArray, ComplexArray, FloatArray, FloatArray]:
+        """Return v, ω, v̇, ω̇ and what bounds the third derivatives at times t."""
+        _, p1, p2, _ = _polynomial(self._position, knot, t - self._t[knot])
+        h0, h1, h2, _ = (
+            x.real for x in _polynomial(self._heading, knot, t - self._t[knot])
+        )
+        turn = np.exp(-1j * h0)
+        v = turn * p1 - 1j * h1 * self._point
+        v_dot = turn * (p2 - 1j * h1 * p1) - 1j * h2 * self._point
+        sizes = np.stack([np.abs(p1), np.abs(p2), np.abs(h1), np.abs(h2)])
+        return v, h1, v_dot, h2, sizes
+
+    def enclose(self, parts: Intervals) -> Enclosure:
+        """Return an enclosure of every part."""
+        dt = parts.t1 - parts.t0
+        v0, o0, vd0, od0, at0 = self._at(parts.knot, parts.t0)
+        v1, o1, vd1, od1, at1 = self._at(parts.knot, parts.t1)
+        p1, p2, h1, h2 = np.maximum(at0, at1)
+        p3 = 6 * np.abs(self._position[0, parts.knot])
+        h3 = 6 * np.abs(self._heading[0, parts.knot])
+        # The second derivative is linear, so its ends bound it; the first one bends.
+        p1 = p1 + dt**2 / 8 * p3
+        h1 = h1 + dt**2 / 8 * h3
+        # d²/dt² (e^{-jθ} p') = e^{-jθ} (p''' - 2jθ'p'' - jθ''p' - θ'²p')
+        v_ddot = p3 + 2 * h1 * p2 + h2 * p1 + h1**2 * p1 + h3 * abs(self._point)
+        one = np.ones_like(dt)
+        return Enclosure(
+            dt, v0, v1, o0, o1, vd0, vd1, od0, od1, v_ddot, h3, one, one, one, one
+        )
+
+
+class TwistMotion:
+    """Body twists, linear in time between the samples."""
+
+    is_own = False
+    has_rates = True
+    interpolation = "body twist linear between the samples"
+
+    def __init__(self, t: FloatArray, samples: FloatArray, point: complex) -> None:
+        t, samples = _with_zero_crossings(t, samples)
+        self._t = t
+        self._omega = samples[:, 2]
+        self._v = samples[:, 0] + 1j * samples[:, 1] - 1j * self._omega * point
+
+    def intervals(self) -> Intervals:
+        """Return the intervals between the samples."""
+        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+
+    def enclose(self, parts: Intervals) -> Enclosure:
+        """Return an enclosure of every part; it has no excess."""
+        k = parts.knot
+        span = self._t[k + 1] - self._t[k]
+        v_dot = (self._v[k + 1] - self._v[k]) / span
+        omega_dot = (self._omega[k + 1] - self._omega[k]) / span
+        f0, f1 = ((t - self._t[k]) / span for t in (parts.t0, parts.t1))
+        v0, v1 = ((1 - f) * self._v[k] + f * self._v[k + 1] for f in (f0, f1))
+        o0, o1 = ((1 - f) * self._omega[k] + f * self._omega[k + 1] for f in (f0, f1))
+        zero, one = np.zeros_like(span), np.ones_like(span)
+        return Enclosure(
+            parts.t1 - parts.t0,
+            v0,
+            v1,
+            o0,
+            o1,
+            v_dot,
+            v_dot,
+            omega_dot,
+            omega_dot,
+            zero,
+            zero,
+            one,
+            one,
+            one,
+            one,
+        )
+
+
+class OmniCurveMotion:
+    """Straight pieces in (κ_n, β, v_n) of one vehicle.
+
+    The twist enclosed is the direction (c e^{jβ}, s κ_g); the speed is a factor on it:
+    |v_n| for the vehicle itself, ``|v_n| v_max`` for any other.
+    """
+
+    has_rates = False
+    interpolation = "linear in κ_n, β and v_n of the trajectory's vehicle"
+
+    def __init__(
+        self,
+        t: FloatArray,
+        samples: FloatArray,
+        kappa_g: float,
+        reference: complex,
+        owner: Vehicle | None = None,
+    ) -> None:
+        """Take the samples as those of `owner`, or of the vehicle that is judged."""
+        # c and s have a kink at |κ_n| = 1, v_s changes sign with v_n.
+        for column, levels in ((0, (-1.0, 1.0)), (2, (0.0,))):
+            for level in levels:
+                t, samples = _with_crossings(t, samples, column, level)
+        self._t, self._samples = t, samples
+        self._kappa_g, self._reference, self._owner = kappa_g, reference, owner
+        self.is_own = owner is None
+
+    def intervals(self) -> Intervals:
+        """Return the intervals between the samples and the kinks."""
+        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+
+    def enclose(self, parts: Intervals) -> Enclosure:
+        """Return an enclosure of every part."""
+        k = parts.knot
+        span = self._t[k + 1] - self._t[k]
+        rate = (self._samples[k + 1] - self._samples[k]) / span[:, None]
+        at0, at1 = (
+            self._samples[k] + (t - self._t[k])[:, None] * rate
+            for t in (parts.t0, parts.t1)
+        )
+        middle = (self._samples[k, 0] + self._samples[k + 1, 0]) / 2
+        gentle = np.abs(middle) < 1
+        side = np.where(middle < 0, -1.0, 1.0)
+        c_dot = np.where(gentle, 0.0, -side * rate[:, 0])
+        s_dot = np.where(gentle, rate[:, 0], 0.0)
+        factor = np.where(self._samples[k, 2] + self._samples[k + 1, 2] < 0, -1.0, 1.0)
+        kappa_g, offset = self._kappa_g, self._reference
+        ends = []
+        for at in (at0, at1):
+            c = np.where(gentle, 1.0, 2 - np.abs(at[:, 0]))
+            s = np.where(gentle, at[:, 0], side)
+            omega = factor * s * kappa_g
+            omega_dot = factor * s_dot * kappa_g
+            e = factor * np.exp(1j * at[:, 1])
+            v_dot = (c_dot + 1j * rate[:, 1] * c) * e - 1j * omega_dot * offset
+            ends.append((c, c * e - 1j * omega * offset, omega, v_dot, omega_dot))
+        (c0, v0, o0, vd0, od0), (c1, v1, o1, vd1, od1) = ends
+        v_ddot = 2 * np.abs(c_dot * rate[:, 1]) + np.maximum(c0, c1) * rate[:, 1] ** 2
+        share = np.abs(at0[:, 2]), np.abs(at1[:, 2])
+        dt = parts.t1 - parts.t0
+        zero = np.zeros_like(dt)
+        if self._owner is None:
+            scale = (*share, np.maximum(*share))
+        else:
+            radius = dt**2 / 8 * v_ddot
+            ends_ = (v0, v1, o0, o1)
+            scale = _speeds(self._owner, (at0, at1), share, factor, ends_, radius)
+        return Enclosure(
+            dt, v0, v1, o0, o1, vd0, vd1, od0, od1, v_ddot, zero, *scale, factor
+        )
+
+
+def _speeds(
+    owner: Vehicle,
+    at: tuple[FloatArray, FloatArray],
+    share: tuple[FloatArray, FloatArray],
+    factor: FloatArray,
+    ends: tuple[ComplexArray, ComplexArray, FloatArray, FloatArray],
+    radius: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return |v_s| at both ends and a bound over the parts.
+
+    v_max is at most 1/ρ of any one limit, and the ρ of a disc or a strip changes
+    by at most the length that its argument moves.
+    """
+    v0, v1, o0, o1 = ends
+    forward = factor > 0
+    exact = [
+        np.where(
+            forward,
+            exact_v_max(owner, end[:, 0], end[:, 1]),
+            exact_v_max(owner, end[:, 0], end[:, 1], reverse=True),
+        )
+        for end in at
+    ]
+    kappa_g, offset = owner.boundary_curvature, owner.reference
+    s = np.stack([o0, o1]) / kappa_g
+    v = np.stack([v0, v1]) + 1j * np.stack([o0, o1]) * offset
+    v_reach = np.abs(v[1] - v[0]) / 2 + radius
+    s_reach = np.abs(s[1] - s[0]) / 2
+    rho = np.full(radius.shape, 1e-9)
+    for row in active_rows(rows_of(owner)[0], False):
+        if row.kind == "product":
+            continue
+        z = row.p * v.mean(axis=0) + s.mean(axis=0) * row.b
+        size = (
+            np.abs(z) if row.kind == "disc" else np.abs((z * np.exp(-1j * row.nu)).real)
+        )
+        rho = np.maximum(rho, size - row.p * v_reach - abs(row.b) * s_reach)
+    high = np.maximum(*share) / rho
+    return share[0] * exact[0], share[1] * exact[1], high
+
+
+End: TypeAlias = Literal["not-a-knot"] | tuple[Literal[1, 2], float]
+
+
+def _spline(t: FloatArray, values: FloatArray, rest0: bool, rest1: bool) -> FloatArray:
+    """Return cubic coefficients (4, n - 1); at rest where asked."""
+    # Without a fourth sample there is no third derivative to keep: natural ends.
+    free: End = "not-a-knot" if len(t) > 3 else (2, 0.0)
+    rest: End = (1, 0.0)
+    ends: Any = (rest if rest0 else free, rest if rest1 else free)
+    return np.asarray(CubicSpline(t, values, bc_type=ends).c)
+
+
+def _polynomial(
+    coefficients: npt.NDArray[np.generic], knot: IntArray, h: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+    """Return value and three derivatives of cubic pieces."""
+    a, b, c, d = coefficients[:, knot]
+    return (
+        ((a * h + b) * h + c) * h + d,
+        (3 * a * h + 2 * b) * h + c,
+        6 * a * h + 2 * b,
+        6 * a,
+    )
+
+
+def _with_crossings(
+    t: FloatArray, samples: FloatArray, column: int, level: float
+) -> tuple[FloatArray, FloatArray]:
+    """Insert samples where a column crosses a level, exactly at the level."""
+    values = samples[:, column] - level
+    at = np.flatnonzero(values[:-1] * values[1:] < 0)
+    f = values[at] / (values[at] - values[at + 1])
+    new = samples[at] + f[:, None] * (samples[at + 1] - samples[at])
+    new[:, column] = level
+    return _inserted(t, samples, at, t[at] + f * (t[at + 1] - t[at]), new)
+
+
+def _with_zero_crossings(
+    t: FloatArray, samples: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Insert standstills where a twist turns into its opposite."""
+    scaled = samples * [1.0, 1.0, HEADING_LENGTH]
+    size = np.linalg.norm(scaled, axis=1)
+    dot = np.einsum("ij,ij->i", scaled[:-1], scaled[1:])
+    both = size[:-1] * size[1:]
+    at = np.flatnonzero((both > 0) & (dot < -(1 - 1e-12) * both))
+    f = size[at] / (size[at] + size[at + 1])
+    when = t[at] + f * (t[at + 1] - t[at])
+    return _inserted(t, samples, at, when, np.zeros((at.size, 3)))
+
+
+def _inserted(
+    t: FloatArray,
+    samples: FloatArray,
+    at: IntArray,
+    when: FloatArray,
+    new: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Insert rows after rows `at`, unless rounding puts them on an existing time."""
+    inside = (when > t[at]) & (when < t[at + 1])
+    at, when, new = at[inside], when[inside], new[inside]
+    return np.insert(t, at + 1, when), np.insert(samples, at + 1, new, axis=0)

@@ -1,0 +1,141 @@
+"""Halving the parts of a motion until every limit is decided on every part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from omniplan.chords import Chord, speed_of
+from omniplan.motion import Enclosure, Intervals, Motion
+from omniplan.rows import Judge, Tolerances
+
+__all__ = ["Parts", "Proof"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+SignArray = npt.NDArray[np.int64]
+
+ROUNDING = 1e-12
+"""A limit counts as kept up to this relative excess: the rounding of float64."""
+RESOLUTION = 1e-6
+"""Parts are halved until low and high utilisation differ by less than this ..."""
+MAX_HALVINGS = 24
+"""... or this often ..."""
+MAX_PARTS = 100_000
+"""... or until there are this many; what is undecided then is refused."""
+SHARPNESS = 1e-3
+"""How sharply the worst utilisation is determined, relative ..."""
+SHARPENING_HALVINGS = 10
+"""... unless that takes more halvings than this."""
+
+CONFIGURATION_LIMITS = frozenset({"SINGULAR", "STEER_RANGE", "STEER_RATE", "BLOCKED"})
+"""Limits that are not judged while the vehicle stands."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The m parts of a motion and what is known about them."""
+
+    spans: Intervals
+    enclosure: Enclosure
+    stands: BoolArray
+    """(m,) whether the vehicle stands all over a part."""
+    low: dict[int, FloatArray]
+    """(m, rows) utilisation that is reached, per representation."""
+    high: dict[int, FloatArray]
+    """(m, rows) utilisation that is never exceeded."""
+
+    def picked(self, sign: SignArray) -> tuple[FloatArray, FloatArray]:
+        """Return low and high of the representation chosen for each part.
+
+        Parameters
+        ----------
+        sign : (m,) int, {-1, 1}
+        """
+        if len(self.low) == 1:
+            return self.low[1], self.high[1]
+        forward = (sign > 0)[:, None]
+        return (
+            np.where(forward, self.low[1], self.low[-1]),
+            np.where(forward, self.high[1], self.high[-1]),
+        )
+
+
+class Proof:
+    """Parts of one motion under one judge, refined step by step."""
+
+    def __init__(self, motion: Motion, judge: Judge, tolerances: Tolerances) -> None:
+        self._motion, self._judge, self._tolerances = motion, judge, tolerances
+        ambiguous = judge.needs_configuration and not motion.is_own
+        self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
+        self._free_at_rest = np.array(
+            [row.limit in CONFIGURATION_LIMITS for row in judge.rows], dtype=bool
+        )
+        spans = motion.intervals()
+        self._step = spans.t1 - spans.t0
+        self.parts = self._evaluate(spans)
+
+    def _evaluate(self, spans: Intervals) -> Parts:
+        part = self._motion.enclose(spans)
+        body = Chord.of(part, self._judge.reference)
+        speed = speed_of(part, body, self._judge.kappa_g)[1] * part.scale_high
+        stands = (speed <= self._tolerances.standstill) & (not self._motion.is_own)
+        low, high = {}, {}
+        for sign in self.signs:
+            low[sign], high[sign] = self._judge.utilisation(part, sign)
+            # At rest the wheels may stand anyhow; how they turn is judged apart.
+            for bounds in (low[sign], high[sign]):
+                bounds[np.ix_(stands, self._free_at_rest)] = 0.0
+        return Parts(spans, part, stands, low, high)
+
+    def decide(self) -> None:
+        """Halve parts until every representation is proved or broken on them."""
+        self._halve(self._undecided, MAX_HALVINGS)
+
+    def _undecided(self, parts: Parts) -> BoolArray:
+        need = np.zeros(parts.stands.shape, dtype=bool)
+        for sign in self.signs:
+            low, high = parts.low[sign], parts.high[sign]
+            broken = low > 1 + ROUNDING
+            with np.errstate(invalid="ignore"):
+                is_open = (high > 1 + ROUNDING) & ~broken & (high - low > RESOLUTION)
+            # A part that breaks one limit is refused whatever the others say.
+            need |= is_open.any(axis=1) & ~broken.any(axis=1)
+        return need
+
+    def sharpen(self, sign_of: Callable[[Intervals], SignArray]) -> None:
+        """Halve the parts that may hold the worst utilisation, until it is sharp.
+
+        Parameters
+        ----------
+        sign_of : callable
+            The representation chosen for each part.
+        """
+        scales = np.array([row.scaling != "none" for row in self._judge.rows])
+
+        def blunt(parts: Parts) -> BoolArray:
+            low, high = parts.picked(sign_of(parts.spans))
+            finite = np.isfinite(high) & np.isfinite(low)
+            low = np.where(finite, low, 0.0)
+            # What can be driven faster is compared among itself: it sets the factor.
+            worst = np.where(
+                scales,
+                low[:, scales].max(initial=0.05),
+                low[:, ~scales].max(initial=0.05),
+            )
+            return np.asarray((finite & (high > worst * (1 + SHARPNESS))).any(axis=1))
+
+        self._halve(blunt, SHARPENING_HALVINGS)
+
+    def _halve(self, wanted: Callable[[Parts], BoolArray], halvings: int) -> None:
+        smallest = self._step / 2**halvings
+        while True:
+            need = wanted(self.parts)
+            spans = self.parts.spans
+            need &= spans.t1 - spans.t0 > smallest[spans.knot]
+            if not need.any() or need.size + np.count_nonzero(need) > MAX_PARTS:
+                return
+            self.parts = self._evaluate(spans.halved(need))

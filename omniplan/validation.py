@@ -1,0 +1,220 @@
+"""Validation: is a trajectory drivable by a vehicle, and if not, where and why.
+
+Every part of the motion between the samples is judged by bounds that hold all along
+it. A part that is neither shown to keep a limit nor shown to break it is halved; what
+stays undecided at the stated resolution (see `proof`) is not permitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from configspace import PermissibleSpace
+from configspace.omni_curve import curvature_of_ratio
+from configspace.vehicle import SteeredWheel
+from omniplan.chords import Chord
+from omniplan.judge import is_own, judge_for
+from omniplan.motion import Motion, motion_of
+from omniplan.proof import Parts, Proof
+from omniplan.report import Advice, Report
+from omniplan.rows import Judge, Tolerances
+from omniplan.standstill import Choice, choose_configurations
+from omniplan.trajectory import Trajectory
+from omniplan.violations import find_violations, reconfiguration_violations
+
+__all__ = ["Tolerances", "validate"]
+
+
+def validate(
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    tolerances: Tolerances | None = None,
+) -> Report:
+    """Judge a trajectory for a vehicle.
+
+    With a space that knows its vehicle the exact formulas are used and every limit of
+    its file is judged; a data sheet alone answers from its table, in which mixed cells
+    count as blocked.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    space : PermissibleSpace
+    tolerances : Tolerances, optional
+        What counts as standing and as free of slip.
+
+    Returns
+    -------
+    Report
+        Valid only if every limit is proved to hold at and between the samples.
+
+    References
+    ----------
+    spec/omni-curve §5.
+
+    Examples
+    --------
+    >>> import configspace, omniplan
+    >>> space = configspace.build_space(
+    ...     configspace.load_vehicle("differential"), cache=False)
+    >>> line = omniplan.Trajectory.from_poses([0, 1], [[0, 0, 0], [0.5, 0, 0]])
+    >>> omniplan.validate(line, space).valid
+    True
+    """
+    tolerances = tolerances or Tolerances()
+    report = _judged(trajectory, space, tolerances)
+    if report.valid:
+        return report
+    advice = (
+        *_slow_down(report, trajectory, space, tolerances),
+        *_dwell(report, trajectory, space, tolerances),
+    )
+    return replace(report, advice=advice)
+
+
+def _judged(
+    trajectory: Trajectory, space: PermissibleSpace, tolerances: Tolerances
+) -> Report:
+    motion = motion_of(trajectory, is_own=is_own(trajectory, space))
+    judge = judge_for(space, motion, tolerances)
+    proof = Proof(motion, judge, tolerances)
+    proof.decide()
+    choice = choose_configurations(proof, judge, space, tolerances)
+    proof.sharpen(choice.sign_of)
+    violations = [
+        *find_violations(proof.parts, choice, judge, trajectory, motion, space),
+        *reconfiguration_violations(choice, judge, trajectory, motion, space),
+    ]
+    violations.sort(key=lambda v: (v.t_start, v.limit, v.wheel or ""))
+    margin, tightest, factor = _margins(proof.parts, choice, judge)
+    top_speed, top_yaw_rate = _tops(proof.parts, judge, motion, space)
+    return Report(
+        vehicle=space.name,
+        trajectory=trajectory.name,
+        valid=not violations,
+        violations=tuple(violations),
+        margin=margin,
+        tightest=tightest,
+        duration=trajectory.duration,
+        speed_factor=factor,
+        fastest_duration=trajectory.duration / factor if factor > 0 else None,
+        top_speed=top_speed,
+        top_yaw_rate=top_yaw_rate,
+        advice=(),
+        interpolation=motion.interpolation,
+        not_judged=tuple(_not_judged(space, motion)),
+    )
+
+
+def _margins(parts: Parts, choice: Choice, judge: Judge) -> tuple[float, str, float]:
+    """Return the margin, what it belongs to, and the speed factor."""
+    _, high = parts.picked(choice.sign_of(parts.spans))
+    worst = {"nothing": 0.0}
+    factors, drivable = [np.inf], True
+    for row, ratio in zip(judge.rows, high.max(axis=0), strict=True):
+        name = (
+            f"{row.limit} {judge.wheel_ids[row.wheel]}" if row.wheel >= 0 else row.limit
+        )
+        worst[name] = max(worst.get(name, 0.0), float(ratio))
+        if row.scaling == "speed":
+            factors.append(1 / max(float(ratio), 1e-9))
+        elif row.scaling == "acceleration":
+            factors.append(1 / np.sqrt(max(float(ratio), 1e-18)))
+        else:
+            drivable &= bool(ratio <= 1)
+    for stop in choice.standstills:
+        if stop.change.time > 0:
+            used = stop.change.time / max(stop.t1 - stop.t0, 1e-9)
+            worst["RECONFIGURATION"] = max(worst.get("RECONFIGURATION", 0.0), used)
+            factors.append(1 / used)
+            drivable &= bool(np.isfinite(used))
+    tightest = max(worst, key=worst.__getitem__)
+    factor = float(min(factors)) if drivable else 0.0
+    # Finite, so that a report can travel as JSON; nothing limits a motion that stands.
+    return max(1 - worst[tightest], -1e6), tightest, min(factor, 1e6)
+
+
+def _tops(
+    parts: Parts, judge: Judge, motion: Motion, space: PermissibleSpace
+) -> tuple[float, float]:
+    """Return the largest |v| of K and |ω| at the ends of all parts, m/s and rad/s."""
+    e = parts.enclosure
+    body = Chord.of(e, judge.reference)
+    speeds, rates = [], []
+    for v, omega, share in (
+        (body.a, e.omega0, e.scale0),
+        (body.b, e.omega1, e.scale1),
+    ):
+        scale = share
+        if motion.is_own:  # the share is of v_max
+            kappa_n = curvature_of_ratio(np.abs(v), e.sign * omega / judge.kappa_g)
+            v_max = space.v_max(np.clip(kappa_n, -2, 2), np.angle(e.sign * v))
+            scale = share * v_max
+        speeds.append(float((np.abs(v) * scale).max()))
+        rates.append(float((np.abs(omega) * scale).max()))
+    return max(speeds), max(rates)
+
+
+def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
+    """Yield the declared limits that this version does not judge."""
+    vehicle = space.vehicle
+    if vehicle is None:
+        yield "change rates (not in the data sheet)"
+        return
+    steered = [w for w in vehicle.wheels if isinstance(w, SteeredWheel)]
+    if any(w.max_steering_acceleration_deg is not None for w in steered):
+        yield "max_steering_acceleration_deg"
+    if motion.has_rates:
+        return
+    if any(getattr(w, "max_acceleration", None) is not None for w in vehicle.wheels):
+        yield "max_acceleration of the wheels"
+    for name in ("max_acceleration", "max_deceleration"):
+        if getattr(vehicle.limits, name) is not None:
+            yield f"limits.{name}"
+
+
+def _slow_down(
+    report: Report,
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    tolerances: Tolerances,
+) -> tuple[Advice, ...]:
+    """Return the advice to drive slower, if that is proved to help."""
+    # A little below the factor: it is determined to one part in a thousand.
+    factor = report.speed_factor * (1 - 2e-3)
+    if not 0.01 <= factor < 1:
+        return ()
+    if not _judged(trajectory.scaled(factor), space, tolerances).valid:
+        return ()
+    text = (
+        f"drive it at {factor:.1%} of the speed: {trajectory.duration / factor:.2f} s"
+    )
+    return (Advice("slow_down", factor, text),)
+
+
+def _dwell(
+    report: Report,
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    tolerances: Tolerances,
+) -> tuple[Advice, ...]:
+    """Return the advice to stand still longer, if that is proved to help."""
+    short = [v for v in report.violations if v.limit == "RECONFIGURATION"]
+    if len(short) != len(report.violations) or trajectory.form != "poses":
+        return ()
+    longer, waits = trajectory, []
+    for violation in reversed(short):  # from the back, so that rows keep their numbers
+        if violation.value is None:
+            return ()
+        row = int(np.abs(trajectory.t - violation.t).argmin())
+        wait = violation.value * (1 + 1e-9) + 1e-6
+        longer = longer.with_dwell(row, wait)
+        waits.append((float(trajectory.t[row]), wait))
+    if not _judged(longer, space, tolerances).valid:
+        return ()
+    text = " and ".join(f"{wait:.2f} s at t = {t:.2f} s" for t, wait in waits[::-1])
+    total = sum(wait for _, wait in waits)
+    return (Advice("dwell", total, f"stand still for {text}"),)

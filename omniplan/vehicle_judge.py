@@ -1,0 +1,254 @@
+"""Judging by the exact formulas of a known vehicle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace import Vehicle
+from configspace.angles import wrap
+from configspace.vehicle import (
+    Castor,
+    FixedWheel,
+    MecanumWheel,
+    OmniWheel,
+    SteeredWheel,
+)
+from omniplan.chords import (
+    Change,
+    Chord,
+    along,
+    changed,
+    ends_moving,
+    growth,
+    over,
+    scaled,
+    size,
+    speed_of,
+    turning,
+)
+from omniplan.motion import Enclosure
+from omniplan.rows import Bounds, Row, Tolerances
+
+__all__ = ["VehicleJudge"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class VehicleJudge:
+    """Judges by the exact formulas of a known vehicle."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        tolerances: Tolerances,
+        *,
+        is_own: bool,
+        has_rates: bool,
+    ) -> None:
+        self._vehicle = vehicle
+        self._tolerances = tolerances
+        self._is_own = is_own
+        self._has_rates = has_rates
+        self.kappa_g = vehicle.boundary_curvature
+        self.reference = vehicle.reference
+        self.wheel_ids = tuple(wheel.id for wheel in vehicle.wheels)
+        self.needs_configuration = any(
+            isinstance(wheel, SteeredWheel) for wheel in vehicle.wheels
+        )
+        self.rows: tuple[Row, ...] = ()
+        # One evaluation on an empty part lists the rows.
+        empty = np.zeros(0)
+        nothing = Enclosure(*([empty] * 15))  # type: ignore[arg-type]
+        self.rows = tuple(row for row, _ in self._evaluate(nothing, 1))
+
+    def utilisation(self, part: Enclosure, sign: int) -> Bounds:
+        """Return low and high utilisation, (m, rows), of representation `sign`."""
+        bounds = [bound for _, bound in self._evaluate(part, sign)]
+        if not bounds:
+            nothing = np.zeros((part.dt.size, 0))
+            return nothing, nothing
+        low, high = (np.stack(column, axis=1) for column in zip(*bounds, strict=True))
+        return low, high
+
+    def _evaluate(self, part: Enclosure, sign: int) -> list[tuple[Row, Bounds]]:
+        own = sign * part.sign
+        body = Chord.of(part, self.reference)
+        speed = speed_of(part, body, self.kappa_g)
+        # An own (κ_n, β) is a configuration even where the vehicle stands.
+        floor = -1.0 if self._is_own else self._tolerances.standstill
+        moving = ends_moving(part, body, self.kappa_g, floor)
+        entries: list[tuple[Row, Bounds]] = []
+        for i, wheel in enumerate(self._vehicle.wheels):
+            if isinstance(wheel, Castor):
+                continue
+            chord = Chord.of(part, wheel.position)
+            change = Change.of(part, wheel.position)
+            if isinstance(wheel, SteeredWheel):
+                entries += self._steered(i, wheel, part, chord, change, own, moving)
+                gain = growth(part, chord, change, 0)
+            else:
+                if isinstance(wheel, FixedWheel):
+                    entries.append(self._slip(i, wheel, chord, speed))
+                # Only the component along the driven direction rolls.
+                roller = 0.0 if isinstance(wheel, FixedWheel) else wheel.roller
+                turn = np.exp(-1j * (wheel.heading + roller)) / math.cos(roller)
+                chord, change = along(chord, turn), changed(part, change, turn)
+                gain = size(change)
+            entries += self._rolling(i, wheel, part, chord, gain)
+        return entries + self._whole(part, body, own)
+
+    def _steered(
+        self,
+        i: int,
+        wheel: SteeredWheel,
+        part: Enclosure,
+        chord: Chord,
+        change: Change,
+        own: FloatArray,
+        moving: tuple[FloatArray, FloatArray],
+    ) -> list[tuple[Row, Bounds]]:
+        """Return steering range, singular point and steering rate."""
+        lost = chord.near <= 0
+        # What is reached counts only at ends where the vehicle moves.
+        rolls = [
+            (v > 0) & (np.abs(u) > 1e-9 * v)
+            for v, u in zip(moving, (chord.a, chord.b), strict=True)
+        ]
+        on_wheel = ((moving[0] > 0) & ~rolls[0]) | ((moving[1] > 0) & ~rolls[1])
+        singular = np.where(on_wheel, np.inf, 0.0), np.where(lost, np.inf, 0.0)
+        entries: list[tuple[Row, Bounds]] = [
+            (Row("SINGULAR", i, 0.0, "m/s", "none"), singular)
+        ]
+        least, largest = wheel.steering_range
+        if math.isfinite(largest):
+            half = min((largest - least) / 2, math.pi)
+            middle = (largest + least) / 2
+            start = wrap(np.angle(own * chord.a) - middle)
+            end = start + np.angle(chord.b * chord.a.conj())
+            at_end = wrap(np.angle(own * chord.b) - middle)
+            # The segment sweeps from start to end; its surroundings a little more.
+            high = np.maximum(np.abs(start), np.abs(end)) + chord.spread()
+            low = np.maximum(
+                np.where(rolls[0], np.abs(start), 0.0),
+                np.where(rolls[1], np.abs(at_end), 0.0),
+            )
+            row = Row("STEER_RANGE", i, half, "rad", "none")
+            entries.append((row, (low / half, np.where(lost, np.inf, high / half))))
+        if wheel.max_steering_rate_deg is not None:
+            limit = math.radians(wheel.max_steering_rate_deg)
+            row = Row("STEER_RATE", i, limit, "rad/s", "speed")
+            rate = turning(part, chord, change, (rolls[0], rolls[1]))
+            entries.append((row, over(rate, limit)))
+        return entries
+
+    def _slip(
+        self, i: int, wheel: FixedWheel, chord: Chord, speed: Bounds
+    ) -> tuple[Row, Bounds]:
+        """Sideways slip against what the tolerances allow at this speed."""
+        aside = along(chord, np.exp(-1j * (wheel.heading + math.pi / 2)))
+        allowed = [
+            np.maximum(
+                math.sin(self._tolerances.slip_angle) * v, self._tolerances.slip_speed
+            )
+            for v in speed
+        ]
+        low, high = size(aside)
+        row = Row("FIXED_WHEEL", i, math.sin(self._tolerances.slip_angle), "1", "none")
+        return row, (low / allowed[1], high / allowed[0])
+
+    def _rolling(
+        self,
+        i: int,
+        wheel: SteeredWheel | FixedWheel | MecanumWheel | OmniWheel,
+        part: Enclosure,
+        chord: Chord,
+        gain: Bounds,
+    ) -> list[tuple[Row, Bounds]]:
+        """Return rolling speed and its change."""
+        entries: list[tuple[Row, Bounds]] = []
+        if wheel.max_speed is not None and not self._is_own:
+            row = Row("WHEEL_SPEED", i, wheel.max_speed, "m/s", "speed")
+            entries.append((row, over(scaled(part, chord), row.bound)))
+        if wheel.max_acceleration is not None and self._has_rates:
+            limit = wheel.max_acceleration
+            row = Row("WHEEL_ACCELERATION", i, limit, "m/s²", "acceleration")
+            entries.append((row, over(gain, limit)))
+        return entries
+
+    def _whole(
+        self, part: Enclosure, body: Chord, own: FloatArray
+    ) -> list[tuple[Row, Bounds]]:
+        """Limits of the whole vehicle."""
+        limits = self._vehicle.limits
+        if self._is_own:  # v_n is a share of v_max, which holds all these limits
+            row = Row("V_MAX", -1, 1.0, "1", "speed")
+            share = np.maximum(part.scale0, part.scale1), part.scale_high
+            return [(row, share), *self._gains(part, body)]
+        entries: list[tuple[Row, Bounds]] = []
+        yaw = _yaw(part)
+        v, w = scaled(part, body), scaled(part, yaw)
+        if limits.max_speed is not None:
+            row = Row("SPEED", -1, limits.max_speed, "m/s", "speed")
+            entries.append((row, over(v, row.bound)))
+        if limits.max_reverse_speed is not None:
+            row = Row("REVERSE_SPEED", -1, limits.max_reverse_speed, "m/s", "speed")
+            low, high = over(v, row.bound)
+            surely, perhaps = self._backwards(body, own)
+            bounds = np.where(surely, low, 0.0), np.where(perhaps, high, 0.0)
+            entries.append((row, bounds))
+        if limits.max_yaw_rate_deg is not None:
+            limit = math.radians(limits.max_yaw_rate_deg)
+            entries.append(
+                (Row("YAW_RATE", -1, limit, "rad/s", "speed"), over(w, limit))
+            )
+        if limits.max_lateral_acceleration is not None:
+            limit = limits.max_lateral_acceleration
+            row = Row("LATERAL_ACCELERATION", -1, limit, "m/s²", "acceleration")
+            at_ends = np.maximum(
+                np.abs(body.a * yaw.a) * part.scale0**2,
+                np.abs(body.b * yaw.b) * part.scale1**2,
+            )
+            entries.append((row, over((at_ends, v[1] * w[1]), limit)))
+        return entries + self._gains(part, body)
+
+    def _gains(self, part: Enclosure, body: Chord) -> list[tuple[Row, Bounds]]:
+        """Acceleration and deceleration of K."""
+        if not self._has_rates:
+            return []
+        limits = self._vehicle.limits
+        change = Change.of(part, self.reference)
+        entries: list[tuple[Row, Bounds]] = []
+        for name, limit, side in (
+            ("ACCELERATION", limits.max_acceleration, 1),
+            ("DECELERATION", limits.max_deceleration, -1),
+        ):
+            if limit is not None:
+                row = Row(name, -1, limit, "m/s²", "acceleration")
+                entries.append((row, over(growth(part, body, change, side), limit)))
+        return entries
+
+    def _backwards(
+        self, body: Chord, own: FloatArray
+    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Return whether a part is driven backwards somewhere: surely, possibly.
+
+        A line-mobile vehicle drives backwards where K moves against its constant β,
+        any other where v_s < 0.
+        """
+        line = self._vehicle.mobility.line_beta
+        if line is None:
+            return own < 0, own < 0
+        floor = self._tolerances.standstill
+        forward = [(x * np.exp(-1j * line)).real for x in (body.a, body.b)]
+        least = np.minimum(*forward)
+        return least < -floor, least - body.radius < -floor
+
+
+def _yaw(part: Enclosure) -> Chord:
+    """Return ω as a chord on the real axis."""
+    radius = part.dt**2 / 8 * part.omega_ddot
+    far = np.maximum(np.abs(part.omega0), np.abs(part.omega1)) + radius
+    return Chord(part.omega0 + 0j, part.omega1 + 0j, radius, np.zeros_like(radius), far)

@@ -1,0 +1,350 @@
+"""The promise of a space: an answer "permitted" is never wrong."""
+
+import math
+from dataclasses import replace
+
+import naive
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import configspace
+from configspace import Grid, PermissibleSpace
+from configspace.kernels import BLOCKED, FREE, MIXED
+from configspace.testing import (
+    VEHICLE_KINDS,
+    VehicleKind,
+    assert_sound,
+    configurations,
+    grids,
+    random_configurations,
+    random_vehicle,
+    rigid_body,
+    vehicles,
+)
+from configspace.vehicle import Vehicle
+
+
+def build(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
+    return configspace.build_space(vehicle, grid, cache=False)
+
+
+def sheet_of(space: PermissibleSpace) -> PermissibleSpace:
+    return configspace.parse_space(configspace.dump_space(space))
+
+
+def random_grid(rng: np.random.Generator) -> Grid:
+    return Grid(4 * int(rng.integers(1, 26)), int(rng.integers(8, 181)))
+
+
+def sweep(seed: int, n_vehicles: int, per_vehicle: int) -> None:
+    rng = np.random.default_rng(seed)
+    for i in range(n_vehicles):
+        vehicle = random_vehicle(rng, VEHICLE_KINDS[i % len(VEHICLE_KINDS)])
+        space = build(vehicle, random_grid(rng))
+        kappa_n, beta = random_configurations(rng, vehicle, per_vehicle)
+        assert_sound(space, vehicle, kappa_n, beta)
+        assert_sound(sheet_of(space), vehicle, kappa_n, beta)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hundred_thousand_configurations_are_sound(seed: int) -> None:
+    sweep(seed, 60, 500)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_ten_million_configurations_are_sound() -> None:
+    sweep(1000, 1000, 10_000)
+
+
+@given(vehicles(), configurations(), grids())
+@settings(max_examples=150, deadline=None)
+def test_any_configuration_is_sound(
+    vehicle: Vehicle, configuration: tuple[float, float], grid: Grid
+) -> None:
+    space = build(vehicle, grid)
+    assert_sound(space, vehicle, *configuration)
+    assert_sound(sheet_of(space), vehicle, *configuration)
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_sound_by_the_loop_over_wheels_too(kind: VehicleKind) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(15):
+        vehicle = random_vehicle(rng, kind)
+        space = build(vehicle, random_grid(rng))
+        kappa_n, beta = random_configurations(rng, vehicle, 100)
+        for reverse in (False, True):
+            known = space.v_max(kappa_n, beta, reverse=reverse)
+            alone = sheet_of(space).v_max(kappa_n, beta, reverse=reverse)
+            for j in range(kappa_n.size):
+                truth = naive.exact(vehicle, kappa_n[j], beta[j], reverse=reverse)
+                bound = truth.v_max * (1 + 1e-9)
+                if truth.margin < -1e-9 / max(truth.stillness, 1e-9):
+                    bound = 0.0
+                assert alone[j] <= bound
+                assert known[j] <= bound
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_answers_are_not_vacuous(kind: VehicleKind) -> None:
+    rng = np.random.default_rng(8)
+    speed: list[float] = []
+    seen = lost = 0
+    for _ in range(8):
+        vehicle = random_vehicle(rng, kind)
+        space = build(vehicle, Grid())
+        kappa_n, beta = rng.uniform(-2, 2, 4000), rng.uniform(-np.pi, np.pi, 4000)
+        if vehicle.mobility.line_beta is not None:
+            beta = np.full_like(beta, vehicle.mobility.line_beta)
+        truth = rigid_body(vehicle, kappa_n, beta)
+        open_ = truth.is_clear() & (truth.margin > 0)
+        v_max = truth.v_max[open_]
+        known = space.v_max(kappa_n, beta)[open_]
+        assert (known > 0).all()
+        assert (known >= 0.9 * v_max).all()  # least at peaks far above the mean
+        alone = sheet_of(space).v_max(kappa_n, beta)[open_]
+        both = alone > 0
+        speed.extend(1 - alone[both] / v_max[both])
+        seen, lost = seen + both.size, lost + int((~both).sum())
+    assert np.mean(speed) < 3e-4
+    assert lost < 0.03 * seen
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_cells_bound_what_is_inside_them(kind: VehicleKind) -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(12):
+        vehicle = random_vehicle(rng, kind)
+        space = build(
+            vehicle, Grid(4 * int(rng.integers(1, 10)), 8 + int(rng.integers(60)))
+        )
+        tables = space.tables
+        rows, columns = tables.state.shape
+        row, column = rng.integers(0, rows, 300), rng.integers(0, columns, 300)
+        # Corners, edges, centre, random points; (cell, point).
+        place = rng.random((2, 300, 24))
+        place[:, :, :4] = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, None, :]
+        place[0, :, 4:8] = [0, 1, 0, 1]
+        place[1, :, 8:12] = [0, 1, 0, 1]
+        place[:, :, 12] = 0.5
+        k = space.grid.kappa_edges
+        kappa_n = k[row][:, None] + place[0] * (k[row + 1] - k[row])[:, None]
+        if space.line_beta is None:
+            b = space.grid.beta_edges
+            beta = b[column][:, None] + place[1] * (b[column + 1] - b[column])[:, None]
+        else:
+            beta = np.full_like(kappa_n, space.line_beta)
+        for reverse in (False, True):
+            d = 1 if reverse and len(tables.load) > 1 else 0
+            truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
+            low = tables.v_lo[d, row, column][:, None]
+            high = tables.v_hi[d, row, column][:, None]
+            state = tables.state[row, column][:, None]
+            slack = 4e-15 / np.maximum(truth.stillness, 1e-15) + 3e-14
+            permitted = (truth.margin >= -slack) & (truth.stillness > 1e-13)
+            clear = (truth.margin > slack) & (truth.stillness > 1e-9)
+            assert permitted[np.broadcast_to(state == FREE, permitted.shape)].all()
+            assert not clear[np.broadcast_to(state == BLOCKED, clear.shape)].any()
+            free = np.broadcast_to(state == FREE, permitted.shape)
+            assert (low <= truth.v_max * (1 + 1e-12))[free].all()
+            assert ((low > 0) == (state == FREE)).all()
+            unblocked = np.broadcast_to(state != BLOCKED, permitted.shape)
+            regular = unblocked & (truth.v_max < 1e6)
+            assert (high >= truth.v_max * (1 - 1e-12))[regular].all()
+            # Tight, too: the bounds are reached somewhere in the cell.
+            reached = truth.v_max.min(axis=1)[state[:, 0] == FREE]
+            assert (low[:, 0][state[:, 0] == FREE] >= 0.4 * reached).all()
+
+
+def random_boxes(
+    rng: np.random.Generator, space: PermissibleSpace, vehicle: Vehicle, count: int
+) -> tuple[np.ndarray, ...]:
+    """Boxes around interesting configurations: tiny, cell-sized, some over all β."""
+    kappa_n, beta = random_configurations(rng, vehicle, count)
+    share = 10.0 ** rng.uniform(-9, 0.3, (2, count))
+    half_k = share[0] * 2 / space.grid.n_kappa
+    half_b = share[1] * np.pi / space.grid.n_beta
+    case = rng.integers(0, 6, count)
+    beta = np.where(case == 0, np.pi, beta)  # across the seam
+    kappa_n = np.where(case == 1, np.copysign(2, kappa_n), kappa_n)  # at a pole
+    half_b = np.where((case == 1) & (beta > 0), np.pi, half_b)  # the whole ring
+    half_k = np.where(case == 2, 0.0, half_k)
+    half_b = np.where(case == 3, 0.0, half_b)
+    return (
+        np.clip(kappa_n - half_k, -2, 2),
+        np.clip(kappa_n + half_k, -2, 2),
+        beta - half_b,
+        beta + half_b,
+    )
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_free_boxes_are_permitted_all_over(kind: VehicleKind) -> None:
+    rng = np.random.default_rng(10)
+    seen = np.zeros(3, int)
+    for _ in range(20):
+        vehicle = random_vehicle(rng, kind)
+        space = build(vehicle, random_grid(rng))
+        k0, k1, b0, b1 = random_boxes(rng, space, vehicle, 400)
+        place = rng.random((2, 400, 20))
+        place[:, :, :4] = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, None, :]
+        kappa_n = k0[:, None] + place[0] * (k1 - k0)[:, None]
+        beta = b0[:, None] + place[1] * (b1 - b0)[:, None]
+        if space.line_beta is not None:
+            beta = np.full_like(beta, space.line_beta)
+        for reverse in (False, True):
+            truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
+            slack = 4e-15 / np.maximum(truth.stillness, 1e-15) + 3e-14
+            blocked = (truth.margin < -slack) | (truth.stillness < 1e-13)
+            clear = (truth.margin > slack) & (truth.stillness > 1e-9)
+            for one in (space, replace(space, vehicle=None)):
+                state, v_low = one.box(k0, k1, b0, b1, reverse=reverse)
+                assert set(np.unique(state)) <= {FREE, BLOCKED, MIXED}
+                assert not blocked[state == FREE].any()
+                assert not clear[state == BLOCKED].any()
+                slowest = truth.v_max.min(axis=1)
+                assert (v_low <= slowest * (1 + 1e-12))[state == FREE].all()
+            seen += np.bincount(state, minlength=3)
+    assert seen[FREE] > 0.1 * seen.sum()
+
+
+def test_tiny_boxes_are_as_fast_as_points() -> None:
+    vehicle = configspace.load_vehicle("mecanum")
+    space = build(vehicle, Grid())
+    rng = np.random.default_rng(11)
+    kappa_n, beta = rng.uniform(-1.99, 1.99, 2000), rng.uniform(-np.pi, np.pi, 2000)
+    state, v_low = space.box(kappa_n, kappa_n, beta, beta)
+    assert (state == FREE).all()
+    np.testing.assert_allclose(v_low, space.v_max(kappa_n, beta), rtol=1e-9)
+
+
+# --- relations between vehicles
+
+
+def mirrored(vehicle: Vehicle) -> Vehicle:
+    """The vehicle seen in a mirror: left and right exchanged."""
+    data = vehicle.model_dump(mode="json")
+    for wheel in data["wheels"]:
+        wheel["y"] = -wheel["y"]
+        for key in ("heading_deg", "roller_deg"):
+            if key in wheel:
+                wheel[key] = -wheel[key]
+        if wheel.get("steering_range_deg"):
+            least, largest = wheel["steering_range_deg"]
+            wheel["steering_range_deg"] = [-largest, -least]
+    if data["reference_point"]:
+        data["reference_point"][1] *= -1
+    return configspace.vehicle_from_data(data)
+
+
+@given(vehicles())
+@settings(max_examples=60, deadline=None)
+def test_a_mirrored_vehicle_has_the_mirrored_space(vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(12)
+    other = mirrored(vehicle)
+    kappa_n, beta = random_configurations(rng, vehicle, 200)
+    clear = rigid_body(vehicle, kappa_n, beta).is_clear(1e-7)
+    one = configspace.exact_v_max(vehicle, kappa_n, beta)[clear]
+    two = configspace.exact_v_max(other, -kappa_n, -beta)[clear]
+    np.testing.assert_allclose(one, two, rtol=1e-7)
+    grid = Grid(16, 24)
+    left, right = build(vehicle, grid).tables, build(other, grid).tables
+    np.testing.assert_allclose(left.v_lo, right.v_lo[:, ::-1, ::-1], rtol=1e-5)
+
+
+@given(vehicles())
+@settings(max_examples=60, deadline=None)
+def test_tighter_limits_never_permit_more(vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(13)
+    data = vehicle.model_dump(mode="json")
+    data["kappa_g"] = vehicle.boundary_curvature
+    for wheel in data["wheels"]:
+        if wheel.get("max_speed") and rng.random() < 0.5:
+            wheel["max_speed"] *= rng.uniform(0.2, 1)
+        if wheel.get("steering_range_deg"):
+            least, largest = wheel["steering_range_deg"]
+            if largest - least < 360:
+                narrower = 0.1 * (largest - least) * rng.random(2)
+                wheel["steering_range_deg"] = [
+                    least + narrower[0],
+                    largest - narrower[1],
+                ]
+    for key, value in data["limits"].items():
+        if value is not None and rng.random() < 0.5:
+            data["limits"][key] = value * rng.uniform(0.2, 1)
+    tighter = configspace.vehicle_from_data(data)
+    kappa_n, beta = random_configurations(rng, vehicle, 200)
+    clear = rigid_body(vehicle, kappa_n, beta).is_clear(1e-7)
+    grid = Grid(16, 24)
+    for reverse in (False, True):
+        less = configspace.exact_v_max(tighter, kappa_n, beta, reverse=reverse)
+        more = configspace.exact_v_max(vehicle, kappa_n, beta, reverse=reverse)
+        assert (less <= more * (1 + 1e-9))[clear].all()
+    narrow, wide = build(tighter, grid).tables, build(vehicle, grid).tables
+    assert (narrow.v_lo[0] <= wide.v_lo[0] * np.float32(1 + 1e-6)).all()
+
+
+@given(vehicles())
+@settings(max_examples=60, deadline=None)
+def test_speeds_scale_with_the_limits(vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(14)
+    data = vehicle.model_dump(mode="json")
+    data["kappa_g"] = vehicle.boundary_curvature
+    factor = 1.7
+    for wheel in data["wheels"]:
+        if wheel.get("max_speed"):
+            wheel["max_speed"] *= factor
+    for key, value in data["limits"].items():
+        if value is not None:
+            power = 2 if key == "max_lateral_acceleration" else 1
+            data["limits"][key] = value * factor**power
+    faster = configspace.vehicle_from_data(data)
+    kappa_n, beta = random_configurations(rng, vehicle, 300)
+    np.testing.assert_allclose(
+        configspace.exact_v_max(faster, kappa_n, beta),
+        factor * configspace.exact_v_max(vehicle, kappa_n, beta),
+        rtol=1e-9,
+    )
+
+
+@given(vehicles())
+@settings(max_examples=60, deadline=None)
+def test_a_larger_vehicle_has_the_same_space(vehicle: Vehicle) -> None:
+    # κ_n is relative to the vehicle: lengths and limits grow alike.
+    rng = np.random.default_rng(15)
+    factor = 1.5
+    data = vehicle.model_dump(mode="json")
+    data["kappa_g"] = vehicle.boundary_curvature / factor
+    for wheel in data["wheels"]:
+        wheel["x"] *= factor
+        wheel["y"] *= factor
+    if data["reference_point"]:
+        data["reference_point"] = [factor * x for x in data["reference_point"]]
+    limits = data["limits"]
+    if limits["max_yaw_rate_deg"]:
+        limits["max_yaw_rate_deg"] /= factor
+    if limits["max_lateral_acceleration"]:
+        limits["max_lateral_acceleration"] /= factor
+    larger = configspace.vehicle_from_data(data)
+    kappa_n, beta = random_configurations(rng, vehicle, 200)
+    clear = rigid_body(vehicle, kappa_n, beta).is_clear(1e-6)
+    np.testing.assert_allclose(
+        configspace.exact_v_max(larger, kappa_n, beta)[clear],
+        configspace.exact_v_max(vehicle, kappa_n, beta)[clear],
+        rtol=1e-6,
+    )
+
+
+@given(vehicles(("steered", "mixed", "mecanum", "omni")), configurations())
+@settings(max_examples=60, deadline=None)
+def test_a_finer_grid_answers_alike_when_the_vehicle_is_known(
+    vehicle: Vehicle, configuration: tuple[float, float]
+) -> None:
+    exact = float(configspace.exact_v_max(vehicle, *configuration))
+    for grid in (Grid(4, 8), Grid(40, 90)):
+        v_max = float(build(vehicle, grid).v_max(*configuration))
+        assert v_max <= exact * (1 + 1e-12)
+        if math.isfinite(exact) and rigid_body(vehicle, *configuration).is_clear():
+            assert (v_max > 0) == (exact > 0)

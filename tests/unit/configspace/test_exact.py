@@ -1,0 +1,80 @@
+import naive
+import numpy as np
+import pytest
+from hypothesis import given
+
+import configspace
+from configspace import Reason
+from configspace.testing import configurations, rigid_body, vehicles
+from configspace.vehicle import Vehicle
+
+
+@given(vehicles(), configurations())
+def test_exact_speed_is_that_of_the_rigid_body(
+    vehicle: Vehicle, configuration: tuple[float, float]
+) -> None:
+    for reverse in (False, True):
+        truth = naive.exact(vehicle, *configuration, reverse=reverse)
+        other = rigid_body(vehicle, *configuration, reverse=reverse)
+        v_max = float(configspace.exact_v_max(vehicle, *configuration, reverse=reverse))
+        if other.is_clear():
+            assert v_max == pytest.approx(truth.permitted, rel=1e-9)
+            assert v_max == pytest.approx(float(other.permitted), rel=1e-9)
+
+
+@given(vehicles(), configurations())
+def test_a_reason_is_given_for_every_answer(
+    vehicle: Vehicle, configuration: tuple[float, float]
+) -> None:
+    v_max = float(configspace.exact_v_max(vehicle, *configuration))
+    why, who = configspace.exact_reason(vehicle, *configuration)
+    blocking = Reason.STEER_RANGE | Reason.SINGULAR | Reason.FIXED_WHEEL
+    assert int(why) != 0
+    assert (int(why) & blocking != 0) == (v_max == 0)
+    assert -1 <= int(who) < len(vehicle.wheels)
+
+
+def test_a_vehicle_without_speed_limits_is_unbounded_not_an_error() -> None:
+    vehicle = configspace.vehicle_from_data(
+        {"name": "v", "wheels": [{"id": "a", "type": "steered", "x": 1, "y": 0}]}
+    )
+    assert float(configspace.exact_v_max(vehicle, 0.0, 0.0)) == np.inf
+    why, who = configspace.exact_reason(vehicle, 0.0, 0.0)
+    assert (int(why), int(who)) == (0, -1)
+
+
+def test_the_end_of_a_range_is_permitted() -> None:
+    vehicle = configspace.load_vehicle("ift-four-steered")
+    end = np.radians(155)
+    v_max = configspace.exact_v_max(vehicle, 0.0, [end, -end, end + 1e-9, -end - 1e-9])
+    np.testing.assert_allclose(v_max, [1, 1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("steering_range", "permitted", "blocked"),
+    [
+        ((-10, 340), [-9, 0, 90, 180, -90, -21], [-11, -15, -19]),
+        ((0, 180), [0, 1, 90, 179, 180], [-1, -90, -179]),
+        ((100, 260), [100.1, 180, -100.1], [0, 99, -99, 50]),
+        ((-270, 270), [0, 90, 180, -90], []),
+        ((-180, 180), [0, 90, 180, -179], []),
+        ((-0.5, 0.5), [0, 0.4, -0.4], [0.6, -0.6, 180, 90]),
+        ((350, 370), [0, 9, -9], [11, -11, 180]),
+    ],
+)
+def test_direction_decides_whether_an_angle_is_in_range(
+    steering_range: tuple[float, float], permitted: list[float], blocked: list[float]
+) -> None:
+    wheel = {
+        "id": "a",
+        "type": "steered",
+        "x": 0.5,
+        "y": 0.0,
+        "max_speed": 1,
+        "steering_range_deg": steering_range,
+    }
+    vehicle = configspace.vehicle_from_data(
+        {"name": "v", "wheels": [wheel], "limits": {"max_yaw_rate_deg": 90}}
+    )
+    assert (configspace.exact_v_max(vehicle, 0.0, np.radians(permitted)) > 0).all()
+    assert (configspace.exact_v_max(vehicle, 0.0, np.radians(blocked)) == 0).all()
