@@ -57,7 +57,7 @@ examples: $(VENV)/.dev ## run every example
 	@git diff --exit-code --stat -- examples/manoeuvres
 
 bench: $(VENV)/.dev ## measure; see benchmarks/README.md
-	$(BIN)/python -m pytest benchmarks --benchmark-only
+	$(BIN)/python -m pytest benchmarks -o python_files="bench_*.py" --benchmark-only
 
 docs: $(VENV)/.dev ## draw the figures of docs/
 	$(BIN)/python docs/make_figures.py

@@ -74,57 +74,68 @@ def build_space(
 def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
     line = vehicle.mobility.line_beta
     beta = np.array([line, line]) if line is not None else grid.beta_edges
+    c, s = components(grid.kappa_edges)
     loads, sectors = rows_of(vehicle)
     directions = [active_rows(loads, False)]
     if any(row.direction == "reverse" for row in loads):
         directions.append(active_rows(loads, True))
-    c, s = components(grid.kappa_edges)
-    e = np.exp(1j * beta)
-    nodes, low, high, state, reason, wheel = [], [], [], None, [], []
-    for rows in directions:
-        _reject_unlimited(vehicle, rows, c, s, e)
-        table = _load_table(rows)
-        pad = _pad(rows, c, s, float(beta[1] - beta[0]))
-        nodes.append(kernels.node_loads(c, s, e, *table, pad))
-        bounds = kernels.cell_bounds(
-            c,
-            s,
-            e,
-            *table,
-            np.array([int(row.reason) for row in rows]),
-            np.array([row.wheel for row in rows]),
-            *_sector_table(sectors),
-        )
-        low.append(bounds[0])
-        high.append(bounds[1])
-        state = bounds[2]  # steering does not depend on the driving direction
-        reason.append(bounds[3])
-        wheel.append(bounds[4])
-    assert state is not None
-    blocked = state != kernels.FREE
-    with np.errstate(divide="ignore"):
-        v_lo = np.where(blocked, 0.0, 1 / np.sqrt(np.array(high)))
-        v_hi = np.where(
-            state == kernels.BLOCKED, 0.0, 1 / np.sqrt(np.maximum(low, 1e-300))
-        )
+    layers = [_layer(vehicle, rows, sectors, c, s, beta) for rows in directions]
     tables = Tables(
-        load=_rounded_up(np.array(nodes) * (1 + 1e-14)),
-        v_lo=-_rounded_up(-v_lo * (1 - 1e-14)),
-        v_hi=_rounded_up(np.minimum(v_hi * (1 + 1e-14), 3e38)),
-        state=state,
-        reason=np.array(reason),
-        wheel=np.array(wheel),
+        load=np.stack([layer.load for layer in layers]),
+        v_lo=np.stack([layer.v_lo for layer in layers]),
+        v_hi=np.stack([layer.v_hi for layer in layers]),
+        # Steering does not depend on the driving direction.
+        state=layers[0].state,
+        reason=np.stack([layer.reason for layer in layers]),
+        wheel=np.stack([layer.wheel for layer in layers]),
     )
     header = SheetHeader.of(vehicle, grid)
     return PermissibleSpace(header=header, tables=tables, vehicle=vehicle)
 
 
+def _layer(
+    vehicle: Vehicle,
+    rows: Sequence[LoadRow],
+    sectors: Sequence[SectorRow],
+    c: FloatArray,
+    s: FloatArray,
+    beta: FloatArray,
+) -> Tables:
+    """Return the tables for one driving direction, without the axis of directions."""
+    e = np.exp(1j * beta)
+    table = _load_table(rows)
+    low, high, state, reason, wheel = kernels.cell_bounds(
+        c,
+        s,
+        e,
+        *table,
+        np.array([int(row.reason) for row in rows], dtype=np.int64),
+        np.array([row.wheel for row in rows], dtype=np.int64),
+        *_sector_table(sectors),
+    )
+    if ((state == kernels.FREE) & (low < 1e-12)).any():
+        raise _unlimited(vehicle)
+    nodes = kernels.node_loads(c, s, e, *table, _pad(rows, c, s, beta[1] - beta[0]))
+    with np.errstate(divide="ignore"):
+        slowest = np.where(state == kernels.FREE, 1 / np.sqrt(high), 0.0)
+        fastest = np.where(state == kernels.BLOCKED, 0.0, 1 / np.sqrt(low))
+    return Tables(
+        load=_rounded_up(nodes * (1 + 1e-14)),
+        v_lo=-_rounded_up(-slowest * (1 - 1e-14)),
+        # A cell around a wheel's singular point may have no bound on its speed.
+        v_hi=_rounded_up(np.minimum(fastest * (1 + 1e-14), 3e38)),
+        state=state,
+        reason=reason,
+        wheel=wheel,
+    )
+
+
 def _load_table(rows: Sequence[LoadRow]) -> tuple[npt.NDArray[np.generic], ...]:
     return (
-        np.array([_KINDS[row.kind] for row in rows]),
-        np.array([row.p for row in rows]),
-        np.array([row.b for row in rows], dtype=complex),
-        np.array([cmath.exp(1j * row.nu) for row in rows]),
+        np.array([_KINDS[row.kind] for row in rows], dtype=np.int64),
+        np.array([row.p for row in rows], dtype=np.float64),
+        np.array([row.b for row in rows], dtype=np.complex128),
+        np.array([cmath.exp(1j * row.nu) for row in rows], dtype=np.complex128),
     )
 
 
@@ -172,18 +183,8 @@ def _pad(
     return width**2 / 8 * largest
 
 
-def _reject_unlimited(
-    vehicle: Vehicle,
-    rows: Sequence[LoadRow],
-    c: FloatArray,
-    s: FloatArray,
-    e: npt.NDArray[np.complex128],
-) -> None:
-    if rows:
-        load = kernels.node_loads(c, s, e, *_load_table(rows), np.zeros_like(c))
-        if load.min() > 1e-12:
-            return
-    raise InvalidVehicle(
+def _unlimited(vehicle: Vehicle) -> InvalidVehicle:
+    return InvalidVehicle(
         Problem(
             "limits",
             "no limit bounds the speed of some configurations",

@@ -106,7 +106,8 @@ def _load_range(
     if kind == _DISC:
         low, high = _cos_range(e0, e1, p * b)
         bb = b.real * b.real + b.imag * b.imag
-        return _disc_range(c0, s0, c1, s1, p, bb, low, high)
+        least, largest = _disc_range(c0, s0, c1, s1, p, bb, low, high)
+        return least, largest
     if kind == _STRIP:
         low, high = _cos_range(e0, e1, p * n)
         h = b.real * n.real + b.imag * n.imag

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
-import tempfile
+import secrets
 from dataclasses import asdict
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from configspace.space import (
 __all__ = ["dump_space", "load_space", "parse_space", "save_space"]
 
 _FORMAT = "omniplan data sheet"
+_ENTRY = "omniplan"
 _DTYPES = {
     "load": np.float32,
     "v_lo": np.float32,
@@ -46,13 +47,15 @@ def dump_space(space: PermissibleSpace) -> bytes:
         name: np.ascontiguousarray(getattr(space.tables, name)) for name in _DTYPES
     }
     header = json.dumps(asdict(space.header), sort_keys=True)
-    metadata = {
+    description = {
         "format": _FORMAT,
         "format_version": str(FORMAT_VERSION),
         "algorithm_version": str(ALGORITHM_VERSION),
         "header": header,
         "checksum": _checksum(header, tensors),
     }
+    # One entry, as safetensors writes several in a random order.
+    metadata = {_ENTRY: json.dumps(description, sort_keys=True)}
     return bytes(safetensors.save(tensors, metadata=metadata))
 
 
@@ -64,10 +67,10 @@ def save_space(space: PermissibleSpace, path: Path) -> None:
     CacheError
         If it cannot be written; nothing half written is left behind.
     """
-    temporary: str | None = None
+    # Not tempfile: its files can be read by their owner only.
+    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(8)}")
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             file.write(dump_space(space))
             file.flush()
             os.fsync(file.fileno())
@@ -75,9 +78,8 @@ def save_space(space: PermissibleSpace, path: Path) -> None:
     except OSError as error:
         raise CacheError(f"data sheet {path}: cannot be written: {error}") from error
     finally:
-        if temporary is not None:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(temporary)
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def load_space(path: str | Path) -> PermissibleSpace:
@@ -136,7 +138,8 @@ def _metadata(content: bytes, subject: str) -> dict[str, str]:
         size = int.from_bytes(content[:8], "little")
         if len(content) < 8 or size > len(content) - 8:
             raise ValueError("truncated")
-        metadata = json.loads(content[8 : 8 + size])["__metadata__"]
+        header = json.loads(content[8 : 8 + size])
+        metadata = json.loads(header["__metadata__"][_ENTRY])
         return {str(key): str(value) for key, value in metadata.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CacheError(f"{subject}: damaged: {error!r}") from error

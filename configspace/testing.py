@@ -193,7 +193,7 @@ def rigid_body(
     margin = np.full(kappa_n.shape, np.inf)
     stillness = np.full(kappa_n.shape, np.inf)
     k = vehicle.reference
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         for wheel in vehicle.wheels:
             if isinstance(wheel, Castor):
                 continue

@@ -78,7 +78,7 @@ def _reject_second_axle(first: WheelPlace, other: WheelPlace, axle: complex) -> 
     if not parallel:
         raise ValueError(
             f"wheels: the fixed wheels {first.id} and {other.id} have axles that "
-            "cross, so the vehicle could only turn about that one point; all fixed wheels "
+            "cross, so the vehicle could only turn about that point; all fixed wheels "
             "must share one axle line"
         )
     apart = ((other.position - first.position) * axle.conjugate()).imag

@@ -7,6 +7,7 @@ commands that use them, so that ``omniplan --help`` is quick.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
@@ -220,10 +221,12 @@ def _serve(options: argparse.Namespace) -> int:
     from services import Server
 
     fleet = _fleet(options.fleet, _progress_console())
-    with Server(fleet, site=options.site, listen=options.listen) as server:
-        stop = lambda *_: server.close()  # noqa: E731
-        signal.signal(signal.SIGTERM, stop)
-        signal.signal(signal.SIGINT, stop)
+    # As if Ctrl-C were pressed: close() belongs to the main thread, not to a handler.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with (
+        contextlib.suppress(KeyboardInterrupt),
+        Server(fleet, site=options.site, listen=options.listen) as server,
+    ):
         names = [space.name for space in fleet]
         if options.json:
             _print_json({"endpoint": server.endpoint, "vehicles": names})
@@ -356,3 +359,7 @@ def _say(text: str, as_json: bool) -> None:
 
 def _print_json(data: object) -> None:
     print(json.dumps(data, indent=2, allow_nan=False), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -131,8 +131,8 @@ def _pictures(
 def _footprint(
     ranking: Ranking, spaces: Sequence[PermissibleSpace]
 ) -> tuple[tuple[float, float], ...] | None:
-    """Return the outline of the vehicle that drives a manoeuvre best."""
-    if ranking.best is None:
+    """Return the outline of the slowest suitable vehicle, mostly the least agile."""
+    if not ranking.suitable:
         return None
     outlines = {space.name: space.header.footprint for space in spaces}
-    return outlines[ranking.best.vehicle] or None
+    return outlines[ranking.suitable[-1].vehicle] or None

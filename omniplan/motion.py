@@ -13,6 +13,7 @@ Twists are those of the origin of the vehicle files' frame, ``v = vx + j vy``.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, TypeAlias
 
@@ -24,7 +25,6 @@ from configspace import Vehicle, exact_v_max
 from configspace.exact import active_rows
 from configspace.limits import rows_of
 from omniplan.trajectory import Trajectory
-import itertools
 
 __all__ = ["Enclosure", "Intervals", "Motion", "motion_of"]
 

@@ -7,6 +7,7 @@ configuration, inside the space and in the time there is.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -21,7 +22,6 @@ from omniplan.judge import judge_for
 from omniplan.motion import Intervals, OmniCurveMotion
 from omniplan.proof import ROUNDING, Parts, Proof
 from omniplan.rows import Judge, Tolerances
-import itertools
 
 __all__ = ["Choice", "Reconfiguration", "choose_configurations"]
 

@@ -35,6 +35,12 @@ COLUMNS: dict[Form, tuple[str, str, str]] = {
 }
 """The three columns of each form, as in CSV files."""
 
+MAX_TIME = 1e10
+"""Largest |t|, s: room for the seconds since 1970 and far more."""
+MIN_STEP = 1e-6
+"""Least time from sample to sample, s."""
+MAX_VALUE = 1e6
+"""Largest size of any other value: m, m/s, rad or rad/s."""
 MAX_HEADING_STEP = math.pi / 2 + 1e-9
 """A larger turn from sample to sample is ambiguous, rad."""
 
@@ -151,12 +157,19 @@ class Trajectory:
         InvalidTrajectory
             With the number of the first offending row.
         """
-        columns = np.broadcast_arrays(
-            *(np.asarray(x, dtype=object) for x in (kappa_n, beta, v_n))
-        )
-        times, samples = _checked(
-            name, t, np.stack(columns, axis=-1), COLUMNS["omni_curve"]
-        )
+        labels = COLUMNS["omni_curve"]
+        columns = [
+            _numbers(name, label, column)
+            for label, column in zip(labels, (kappa_n, beta, v_n), strict=True)
+        ]
+        if len({column.shape for column in columns}) > 1:
+            shapes = ", ".join(str(column.shape) for column in columns)
+            raise InvalidTrajectory(
+                Problem(
+                    name, f"{', '.join(labels)} of shapes {shapes}", "one shape (n,)"
+                )
+            )
+        times, samples = _checked(name, t, np.stack(columns, axis=-1), labels)
         for column, limit, allowed in ((0, 2.0, "[-2, 2]"), (2, 1.0, "[-1, 1]")):
             outside = np.flatnonzero(np.abs(samples[:, column]) > limit)
             if outside.size:
@@ -302,13 +315,26 @@ class Trajectory:
         return build(data["t"], data[form], name=name, reference_point=point)
 
 
-def _point(name: str, value: object) -> tuple[float, float]:
+def _numbers(name: str, what: str, values: npt.ArrayLike) -> FloatArray:
+    """Return a new float array, or raise unless all values are numbers."""
     try:
-        x, y = (float(v) for v in value)  # type: ignore[attr-defined]
-        if math.isfinite(x) and math.isfinite(y):
-            return x, y
-    except (TypeError, ValueError):
-        pass
+        array = np.array(values)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise InvalidTrajectory(
+            Problem(f"{name}: {what}", "rows of different lengths", "a regular array")
+        ) from error
+    if array.size and array.dtype.kind not in "fiu":
+        raise InvalidTrajectory(
+            Problem(f"{name}: {what}", "values that are not numbers", "numbers only")
+        )
+    return array.astype(np.float64)
+
+
+def _point(name: str, value: Any) -> tuple[float, float]:
+    if isinstance(value, list | tuple) and len(value) == 2:
+        x, y = _numbers(name, "reference_point", value)
+        if abs(x) <= 100 and abs(y) <= 100:
+            return float(x), float(y)
     raise InvalidTrajectory(
         Problem(
             f"{name}: reference_point", repr(value)[:60], "two finite numbers, in m"
@@ -320,13 +346,7 @@ def _checked(
     name: str, t: npt.ArrayLike, samples: npt.ArrayLike, columns: tuple[str, str, str]
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and samples as new float arrays, or raise with the row."""
-    try:
-        times = np.array(t, dtype=np.float64)
-        values = np.array(samples, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidTrajectory(
-            Problem(name, "values that are not numbers", f"t and {columns} as numbers")
-        ) from error
+    times, values = _numbers(name, "t", t), _numbers(name, "samples", samples)
     if times.ndim != 1 or values.shape != (times.size, 3):
         raise InvalidTrajectory(
             Problem(
@@ -339,12 +359,19 @@ def _checked(
         raise InvalidTrajectory(
             Problem(name, f"{times.size} sample(s)", "at least two are needed")
         )
-    for column, label in ((times, "t"), *zip(values.T, columns, strict=True)):
-        bad = np.flatnonzero(~np.isfinite(column))
+    for column, label, limit in (
+        (times, "t", MAX_TIME),
+        *(
+            (column, label, MAX_VALUE)
+            for column, label in zip(values.T, columns, strict=True)
+        ),
+    ):
+        bad = np.flatnonzero(~(np.abs(column) <= limit))
         if bad.size:
             row = int(bad[0])
-            raise _invalid(name, row, label, f"{column[row]}", "must be finite")
-    back = np.flatnonzero(np.diff(times) <= 0)
+            allowed = f"must be finite, at most {limit:g} in size"
+            raise _invalid(name, row, label, f"{column[row]}", allowed)
+    back = np.flatnonzero(np.diff(times) < MIN_STEP)
     if back.size:
         row = int(back[0]) + 1
         raise _invalid(
@@ -352,7 +379,7 @@ def _checked(
             row,
             "t",
             f"{times[row]:g} s after {times[row - 1]:g} s",
-            "must increase from row to row",
+            "must increase from row to row, by at least a microsecond",
         )
     return times, values
 

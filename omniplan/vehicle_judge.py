@@ -251,4 +251,7 @@ def _yaw(part: Enclosure) -> Chord:
     """Return ω as a chord on the real axis."""
     radius = part.dt**2 / 8 * part.omega_ddot
     far = np.maximum(np.abs(part.omega0), np.abs(part.omega1)) + radius
-    return Chord(part.omega0 + 0j, part.omega1 + 0j, radius, np.zeros_like(radius), far)
+    first, last = (
+        np.asarray(w, dtype=np.complex128) for w in (part.omega0, part.omega1)
+    )
+    return Chord(first, last, radius, np.zeros_like(radius), far)

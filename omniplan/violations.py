@@ -170,11 +170,12 @@ def find_violations(
     sign = choice.sign_of(parts.spans)
     low, high = parts.picked(sign)
     describer = _Describer(judge, trajectory, motion, space)
-    broken = low > 1 + ROUNDING
+    broken = np.asarray(low > 1 + ROUNDING, dtype=bool)
     # Where one limit is surely broken the others were not pursued to the end.
-    open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1)[:, None]
+    open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1, keepdims=True)
+    refused = np.asarray(broken | open_, dtype=bool)
     for column, row in enumerate(judge.rows):
-        for run in _runs(np.asarray(broken | open_)[:, column]):
+        for run in _runs(refused[:, column]):
             reached = low[run, column]
             is_proved = bool((reached > 1 + ROUNDING).any())
             ranked = reached if is_proved else high[run, column]

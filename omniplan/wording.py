@@ -108,8 +108,8 @@ def report_lines(report: Report) -> Iterator[str]:
     if report.valid:
         yield (
             f"  {report.duration:.2f} s as given, at best "
-            f"{report.fastest_duration:.2f} s (factor {report.speed_factor:.2f}); margin {report.margin:.1%}"
-            f" ({report.tightest})"
+            f"{report.fastest_duration:.2f} s (factor {report.speed_factor:.2f}); "
+            f"margin {report.margin:.1%} ({report.tightest})"
         )
     if report.not_judged:
         yield f"  not judged: {', '.join(report.not_judged)}"

@@ -120,7 +120,7 @@ class ServiceTimeout(ServiceError):
     def __init__(self, key: str, timeout: float) -> None:
         self.key = key
         self.timeout = timeout
-        super().__init__(f"{key}: no answer within {timeout:g} s")
+        super().__init__(f"{key}: no answer within {timeout:.3g} s")
 
 
 class RemoteError(ServiceError):

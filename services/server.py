@@ -87,6 +87,7 @@ class Server:
         self._queue_size = queue_size
         limits = RequestLimits(max_bytes, max_samples)
         self._handlers = Handlers(_by_name(fleet), self.health, limits)
+        self._version = version("omniplan")
         self._counts = {"requests": 0, "errors": 0}
         self._lock = threading.Lock()
         self._closed = threading.Event()
@@ -96,6 +97,8 @@ class Server:
 
     def start(self) -> None:
         """Begin to answer; a server starts once.
+
+        Until it is closed it keeps the process alive.
 
         Raises
         ------
@@ -136,7 +139,7 @@ class Server:
         _log.info("%s closed", self._keys.root)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until `close` was called, from another thread or a signal handler.
+        """Wait until `close` was called by another thread; Ctrl-C ends the wait.
 
         Parameters
         ----------
@@ -164,7 +167,7 @@ class Server:
         with self._lock:
             counts = dict(self._counts)
         return Health(
-            version=version("omniplan"),
+            version=self._version,
             instance="" if self._peer is None else self._peer.instance,
             vehicles=len(self._handlers.fleet),
             queue_length=0 if self._pool is None else len(self._pool),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -268,13 +269,11 @@ def node_loads(
     c: FloatArray,
     s: FloatArray,
     e: npt.NDArray[np.complex128],
-    kind: npt.NDArray[Any],
-    p: FloatArray,
-    b: npt.NDArray[np.complex128],
-    n: npt.NDArray[np.complex128],
+    table: Sequence[npt.NDArray[Any]],
     pad: FloatArray,
 ) -> FloatArray:
     """Largest squared load at every node: disc 0, strip 1, product 2."""
+    kind, p, b, n = table
     out = np.zeros((c.size, e.size))
     for row in range(kind.size):
         z = c[:, None] * p[row] * e[None, :] + s[:, None] * b[row]
@@ -289,18 +288,16 @@ def node_loads(
 
 
 def load_bounds(
-    kind: int,
-    p: float,
-    b: complex,
-    n: complex,
+    row: Sequence[Any],
     kappa: tuple[float, float],
     beta: tuple[float, float],
 ) -> tuple[float, float]:
     """Least and largest squared load of one row over one cell, by candidates.
 
     The extremes are taken over everything where one can stand: corners, the points of
-    an edge where the derivative vanishes, and the zeros inside the cell.
+    an edge where the derivative vanishes, and a mesh within.
     """
+    kind, p, b, n = int(row[0]), float(row[1]), complex(row[2]), complex(row[3])
 
     def load(k: float, angle: float) -> float:
         c, s = min(1.0, 2 - abs(k)), max(-1.0, min(1.0, k))

@@ -106,10 +106,8 @@ def test_the_diagonal_wheel_is_twice_as_fast(ift: Vehicle) -> None:
         _, u = configspace.wheel_states(ift, kappa_n, beta, 1.0)
         assert u[0] == pytest.approx(0, abs=1e-12)
         assert u[3] == pytest.approx(FOUR["wheel_speed"]["largest_u_4"], abs=1e-12)
-    kappa_n, beta = np.meshgrid(
-        np.linspace(-2, 2, 401), np.linspace(-np.pi, np.pi, 721)
-    )
-    _, u = configspace.wheel_states(ift, kappa_n, beta, 1.0)
+    mesh = np.meshgrid(np.linspace(-2, 2, 401), np.linspace(-np.pi, np.pi, 721))
+    _, u = configspace.wheel_states(ift, mesh[0], mesh[1], 1.0)
     assert u.max() <= FOUR["wheel_speed"]["largest_u_4"] + 1e-12
 
 

@@ -34,7 +34,6 @@ def test_speed_and_yaw_rate_bound_a_vehicle_without_driven_wheels() -> None:
     assert float(space.v_max(2.0, 0.0)) == pytest.approx(np.pi / 4, rel=1e-3)
 
 
-@pytest.mark.xfail(reason="depends on whether a node is at the singular point")
 def test_a_single_driven_wheel_is_judged_alike_wherever_it_stands() -> None:
     outcomes = []
     for y in (0.0, 0.1):

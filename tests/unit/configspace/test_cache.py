@@ -188,7 +188,7 @@ def test_threads_may_build_the_same_space_at_once(tmp_path: Path) -> None:
         "vehicle = configspace.load_vehicle('mecanum')\n"
         "def build(_):\n"
         "    space = configspace.build_space(vehicle, Grid(64, 96), cache=False)\n"
-        "    return b''.join(table.tobytes() for table in vars(space.tables).values())\n"
+        "    return tuple(t.tobytes() for t in vars(space.tables).values())\n"
         "with ThreadPoolExecutor(4) as pool:\n"
         "    found = set(pool.map(build, range(40)))\n"
         "sys.exit(len(found) - 1)\n"

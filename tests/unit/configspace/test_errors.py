@@ -28,7 +28,6 @@ def test_bad_input_is_caught_as_value_error_and_by_the_root() -> None:
             raise InvalidVehicle(ONE)
 
 
-@pytest.mark.xfail(reason="unpickling passes the message for the problems")
 def test_errors_survive_pickling() -> None:
     error = pickle.loads(pickle.dumps(InvalidVehicle([ONE, TWO], "file a.yaml")))
     assert error.problems == (ONE, TWO)

@@ -20,7 +20,7 @@ def test_node_loads_agree_with_the_plain_twin(kind: VehicleKind) -> None:
         e = np.exp(1j * rng.uniform(-np.pi, np.pi, 23))
         pad = rng.uniform(0, 0.1, c.size)
         found = kernels.node_loads(c, s, e, *table, pad)
-        expected = naive.node_loads(c, s, e, *table, pad)  # type: ignore[arg-type]
+        expected = naive.node_loads(c, s, e, table, pad)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
@@ -47,9 +47,9 @@ def test_cell_bounds_agree_with_a_search_of_the_cell(kind: VehicleKind) -> None:
         )
         each = [
             naive.load_bounds(
-                *(column[i] for column in table),  # type: ignore[arg-type]
-                kappa=(kappa[0], kappa[1]),
-                beta=(beta[0], beta[1]),
+                [column[i] for column in table],
+                (float(kappa[0]), float(kappa[1])),
+                (float(beta[0]), float(beta[1])),
             )
             for i in range(len(rows))
         ]

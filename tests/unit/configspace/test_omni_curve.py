@@ -66,8 +66,8 @@ def test_parameters_of_a_twist_are_those_of_the_papers_cases(sign: int) -> None:
     rng = np.random.default_rng(3)
     twists = rng.normal(size=(500, 3)) * [1, 1, KAPPA_G]
     kappa_n, beta, v_s = configspace.from_twist(twists, KAPPA_G, sign)
-    for i, twist in enumerate(twists):
-        expected = naive.from_twist(*twist, KAPPA_G, sign)
+    for i, (vx, vy, omega) in enumerate(twists.tolist()):
+        expected = naive.from_twist(vx, vy, omega, KAPPA_G, sign)
         assert kappa_n[i] == pytest.approx(expected[0], abs=1e-9)
         assert beta[i] == pytest.approx(expected[1], abs=1e-9)
         assert v_s[i] == pytest.approx(expected[2], abs=1e-9)
@@ -106,7 +106,7 @@ def test_sign_of_zero_is_plus() -> None:
 
 def test_pole_and_standstill_have_beta_zero() -> None:
     kappa_n, beta, v_s = configspace.from_twist(
-        [[0, 0, 1.0], [0, 0, -1.0], [0, 0, 0]], KAPPA_G
+        [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]], KAPPA_G
     )
     np.testing.assert_array_equal(kappa_n, [2, -2, 0])
     np.testing.assert_array_equal(beta, 0)

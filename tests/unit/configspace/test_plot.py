@@ -161,7 +161,10 @@ def test_curve_has_a_gap_where_it_is_blocked(
 ) -> None:
     axes = plot_curve(spaces["ackermann"]).axes[0]
     kappa_n, v_max = np.asarray(axes.lines[0].get_data(), float)
-    assert np.isnan(v_max[np.abs(kappa_n) > 0.23]).all()
+    # The inner front wheel stands at 40 degrees where K goes round 1.228 m.
+    edge = 1 / (1.25 * (0.8 / np.tan(np.radians(40)) + 0.275))
+    assert np.isnan(v_max[np.abs(kappa_n) > edge]).all()
+    assert np.isfinite(v_max[np.abs(kappa_n) < edge * 0.99]).all()
     assert "blocked: steering range\nfront-left" in labels(axes.figure)
 
 

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -148,13 +149,13 @@ def test_shapes_that_do_not_broadcast_are_errors(ift: PermissibleSpace) -> None:
     ],
 )
 def test_refuses_what_is_not_a_configuration(
-    ift: PermissibleSpace, kappa_n: object, beta: object
+    ift: PermissibleSpace, kappa_n: Any, beta: Any
 ) -> None:
     for query in (ift.v_max, ift.reason, ift.explain):
         with pytest.raises(configspace.InvalidInput):
-            query(kappa_n, beta)  # type: ignore[operator]
+            query(kappa_n, beta)
     with pytest.raises(configspace.InvalidInput):
-        ift.contains(kappa_n, beta, 0.0)  # type: ignore[arg-type]
+        ift.contains(kappa_n, beta, 0.0)
     with pytest.raises(configspace.InvalidInput):
         ift.contains(0.0, 0.0, np.nan)
 

@@ -61,6 +61,7 @@ def test_fixed_wheels_do_not_slip_sideways() -> None:
         )
     vehicle = configspace.vehicle_from_data({"name": "v", "wheels": wheels})
     beta = vehicle.mobility.line_beta
+    assert beta is not None
     assert beta == pytest.approx(math.radians(heading))
     z = configspace.wheel_directions(vehicle, np.linspace(-2, 2, 41), beta)
     side = (z * np.exp(-1j * math.radians(heading))).imag

@@ -1,0 +1,182 @@
+"""The command line as its user sees it: output, exit codes, error messages."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from omniplan import cli
+
+MANOEUVRES = Path(__file__).parents[3] / "examples" / "manoeuvres"
+Capture = pytest.CaptureFixture[str]
+
+
+def manoeuvre(name: str) -> str:
+    return str(MANOEUVRES / f"{name}.csv")
+
+
+def run_json(capsys: Capture, *arguments: str) -> object:
+    cli.main([*arguments, "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_help_needs_no_heavy_library() -> None:
+    code = (
+        "import sys, omniplan.cli\n"
+        "try: omniplan.cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'numba', 'scipy', 'pydantic', 'zenoh', 'matplotlib', 'rich'}\n"
+        "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert "HEAVY []" in done.stdout
+
+
+def test_permitted_exits_with_0(capsys: Capture) -> None:
+    assert cli.main(["check", manoeuvre("docking"), "--vehicle", "ackermann"]) == 0
+    assert "docking by ackermann: permitted" in capsys.readouterr().out
+
+
+def test_refused_exits_with_1_and_names_wheel_limit_place_and_numbers(
+    capsys: Capture,
+) -> None:
+    assert cli.main(["check", manoeuvre("crab-corner"), "--vehicle", "ackermann"]) == 1
+    out = capsys.readouterr().out
+    assert "wheel front-left: steering angle 90.1°, at most 40.0° permitted at t" in out
+    assert "[STEER_RANGE]" in out
+
+
+def test_bad_input_exits_with_2(capsys: Capture) -> None:
+    assert cli.main(["check", "nowhere.csv", "--vehicle", "mecanum"]) == 2
+    assert "nowhere.csv" in capsys.readouterr().err
+
+
+def test_unknown_vehicle_lists_the_catalogue(capsys: Capture) -> None:
+    assert cli.main(["inspect", "hovercraft"]) == 2
+    assert "ift-four-steered" in capsys.readouterr().err
+
+
+def test_unknown_criterion_is_bad_input(capsys: Capture) -> None:
+    arguments = ["select", manoeuvre("docking"), "--fleet", "mecanum", "--by", "beauty"]
+    assert cli.main(arguments) == 2
+    assert "one of duration, margin" in capsys.readouterr().err
+
+
+def test_damaged_data_sheet_is_a_failure(tmp_path: Path, capsys: Capture) -> None:
+    sheet = tmp_path / "bad.safetensors"
+    sheet.write_bytes(b"nothing of use")
+    assert cli.main(["check", manoeuvre("docking"), "--vehicle", str(sheet)]) == 3
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_errors_are_json_where_json_is_asked_for(capsys: Capture) -> None:
+    answer = run_json(capsys, "inspect", "hovercraft")
+    assert isinstance(answer, dict)
+    assert answer["error"] == "InvalidVehicle"
+
+
+def test_check_as_json_is_a_list_of_reports(capsys: Capture) -> None:
+    answer = run_json(
+        capsys, "check", manoeuvre("crab-corner"), "--vehicle", "differential"
+    )
+    assert isinstance(answer, list)
+    assert answer[0]["valid"] is False
+    assert answer[0]["violations"][0]["limit"] == "FIXED_WHEEL"
+
+
+def test_select_ranks_and_refuses(capsys: Capture) -> None:
+    arguments = ["select", manoeuvre("parking-sideways")]
+    arguments += ["--fleet", "ift-four-steered", "mecanum"]
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "1. mecanum: at best" in out
+    assert "no ift-four-steered: wheel" in out
+    assert "advice: stand still for 0.50 s at t = 3.00 s" in out
+
+
+def test_exported_sheet_judges_without_the_vehicle(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    sheet = tmp_path / "mecanum.safetensors"
+    assert cli.main(["export", "mecanum", str(sheet)]) == 0
+    assert cli.main(["check", manoeuvre("docking"), "--vehicle", str(sheet)]) == 0
+    assert "not judged: change rates" in capsys.readouterr().out
+
+
+def test_inspect_shows_the_figures_of_the_paper(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    arguments = ["inspect", "ift-four-steered", "--plot", str(tmp_path)]
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "4.1013 1/m" in out
+    assert (tmp_path / "space-ift-four-steered.png").stat().st_size > 10_000
+
+
+def test_check_draws_trajectories(tmp_path: Path) -> None:
+    arguments = ["check", manoeuvre("docking"), "--vehicle", "mecanum"]
+    assert cli.main([*arguments, "--plot", str(tmp_path)]) == 0
+    assert (tmp_path / "docking.png").stat().st_size > 5_000
+
+
+def test_catalog_and_schema_print_json(capsys: Capture) -> None:
+    names = run_json(capsys, "catalog")
+    assert isinstance(names, list)
+    assert {"ackermann", "differential", "ift-four-steered", "mecanum"} <= set(names)
+    schema = run_json(capsys, "schema", "vehicle")
+    assert isinstance(schema, dict)
+    assert "wheels" in schema["properties"]
+
+
+def test_query_without_a_server_is_a_failure(capsys: Capture) -> None:
+    arguments = ["query", "health", "--connect", "tcp/127.0.0.1:1", "--timeout", "1"]
+    assert cli.main(arguments) == 3
+    assert "tcp/127.0.0.1:1" in capsys.readouterr().err
+
+
+def test_query_needs_what_it_asks_about(capsys: Capture) -> None:
+    assert cli.main(["query", "check", manoeuvre("docking")]) == 2
+    assert "no vehicle" in capsys.readouterr().err
+
+
+@pytest.mark.service
+def test_demo_judges_over_zenoh_and_draws(tmp_path: Path, capsys: Capture) -> None:
+    rankings = run_json(capsys, "demo", "--output", str(tmp_path))
+    assert isinstance(rankings, list)
+    assert len(rankings) >= 6
+    refused = [report for ranking in rankings for report in ranking["refused"]]
+    assert refused
+    for report in refused:
+        assert report["violations"]
+    assert len(list(tmp_path.glob("space-*.png"))) == 4
+    assert (tmp_path / "manoeuvres.png").exists()
+
+
+@pytest.mark.service
+def test_serve_answers_queries_until_it_is_stopped(capsys: Capture) -> None:
+    command = [sys.executable, "-m", "omniplan.cli", "serve", "--json"]
+    command += ["--fleet", "mecanum", "--listen", "tcp/127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout is not None
+            lines = []
+            for line in server.stdout:  # the JSON it prints once it listens
+                lines.append(line)
+                if line == "}\n":
+                    break
+            endpoint = json.loads("".join(lines))["endpoint"]
+            to_it = ["--connect", endpoint]
+            assert cli.main(["query", "vehicles", *to_it]) == 0
+            assert capsys.readouterr().out == "mecanum\n"
+            turn = manoeuvre("turn-on-the-spot")
+            query = ["query", "check", turn, "--vehicle", "mecanum", *to_it]
+            assert cli.main(query) == 0
+            assert cli.main(["query", "select", turn, *to_it]) == 0
+            assert "1. mecanum" in capsys.readouterr().out
+        finally:
+            server.terminate()
+        assert server.wait(timeout=20) == 0
