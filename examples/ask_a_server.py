@@ -10,7 +10,7 @@ fleet = [
 ]
 spin = omniplan.Trajectory.from_twists(
     [0.0, 1.0, 3.0, 4.0],
-    [[0, 0, 0], [0, 0, 0.8], [0, 0, 0.8], [0, 0, 0]],
+    [[0.0, 0.0, 0.0], [0.0, 0.0, 0.8], [0.0, 0.0, 0.8], [0.0, 0.0, 0.0]],
     name="spin",
 )
 # Port 0 takes a free one; `omniplan serve` and its clients use 7447.

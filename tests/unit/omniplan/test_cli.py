@@ -27,7 +27,7 @@ def test_help_needs_no_heavy_library() -> None:
         "import sys, omniplan.cli\n"
         "try: omniplan.cli.main(['--help'])\n"
         "except SystemExit: pass\n"
-        "heavy = {'numpy', 'numba', 'scipy', 'pydantic', 'zenoh', 'matplotlib', 'rich'}\n"
+        "heavy = {'numpy', 'numba', 'scipy', 'pydantic', 'zenoh', 'rich'}\n"
         "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
     )
     done = subprocess.run(

@@ -72,6 +72,7 @@ def report(vehicle: str, violations: tuple[Violation, ...] = ()) -> Report:
         speed_factor=0.0 if violations else 1.25,
         fastest_duration=None if violations else 6.4,
         top_speed=0.5,
+        top_yaw_rate=0.3,
         advice=(),
         interpolation="",
         not_judged=(),
