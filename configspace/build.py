@@ -13,7 +13,7 @@ import numpy.typing as npt
 from configspace import cache as space_cache
 from configspace import kernels
 from configspace.errors import InvalidVehicle, Problem
-from configspace.exact import active_rows
+from configspace.exact import active_rows, largest_load
 from configspace.grid import Grid
 from configspace.limits import LoadRow, SectorRow, rows_of
 from configspace.omni_curve import components
@@ -74,12 +74,12 @@ def build_space(
 def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
     line = vehicle.mobility.line_beta
     beta = np.array([line, line]) if line is not None else grid.beta_edges
-    c, s = components(grid.kappa_edges)
     loads, sectors = rows_of(vehicle)
     directions = [active_rows(loads, False)]
     if any(row.direction == "reverse" for row in loads):
         directions.append(active_rows(loads, True))
-    layers = [_layer(vehicle, rows, sectors, c, s, beta) for rows in directions]
+    kappa = grid.kappa_edges
+    layers = [_layer(vehicle, rows, sectors, kappa, beta) for rows in directions]
     tables = Tables(
         load=np.stack([layer.load for layer in layers]),
         v_lo=np.stack([layer.v_lo for layer in layers]),
@@ -97,25 +97,19 @@ def _layer(
     vehicle: Vehicle,
     rows: Sequence[LoadRow],
     sectors: Sequence[SectorRow],
-    c: FloatArray,
-    s: FloatArray,
+    kappa: FloatArray,
     beta: FloatArray,
 ) -> Tables:
     """Return the tables for one driving direction, without the axis of directions."""
+    c, s = components(kappa)
     e = np.exp(1j * beta)
-    table = _load_table(rows)
-    low, high, state, reason, wheel = kernels.cell_bounds(
-        c,
-        s,
-        e,
-        *table,
-        np.array([int(row.reason) for row in rows], dtype=np.int64),
-        np.array([row.wheel for row in rows], dtype=np.int64),
-        *_sector_table(sectors),
+    nodes, low, high, state, reason, wheel = kernels.cell_tables(
+        c, s, e, _load_table(rows), _sector_table(sectors)
     )
-    if ((state == kernels.FREE) & (low < 1e-12)).any():
+    suspects = np.argwhere((state == kernels.FREE) & (low < 1e-12))
+    if not rows or _is_unlimited(rows, suspects, kappa, beta):
         raise _unlimited(vehicle)
-    nodes = kernels.node_loads(c, s, e, *table, _pad(rows, c, s, beta[1] - beta[0]))
+    nodes += _pad(rows, c, s, beta[1] - beta[0])[:, None]
     with np.errstate(divide="ignore"):
         slowest = np.where(state == kernels.FREE, 1 / np.sqrt(high), 0.0)
         fastest = np.where(state == kernels.BLOCKED, 0.0, 1 / np.sqrt(low))
@@ -136,6 +130,8 @@ def _load_table(rows: Sequence[LoadRow]) -> tuple[npt.NDArray[np.generic], ...]:
         np.array([row.p for row in rows], dtype=np.float64),
         np.array([row.b for row in rows], dtype=np.complex128),
         np.array([cmath.exp(1j * row.nu) for row in rows], dtype=np.complex128),
+        np.array([int(row.reason) for row in rows], dtype=np.int64),
+        np.array([row.wheel for row in rows], dtype=np.int64),
     )
 
 
@@ -181,6 +177,32 @@ def _pad(
     around = np.pad(curvature, 1, mode="edge")
     largest = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
     return width**2 / 8 * largest
+
+
+def _is_unlimited(
+    rows: Sequence[LoadRow],
+    suspects: npt.NDArray[np.int64],
+    kappa: FloatArray,
+    beta: FloatArray,
+) -> bool:
+    """Return whether some suspected cell holds a point that no limit bounds.
+
+    A cell's least load is bounded by the largest of its rows' least values, which may
+    be 0 though no point of the cell is free of load. So suspects are searched; what
+    the step of the search cannot tell from no limit counts as none.
+    """
+    steps = np.linspace(0, 1, 65)
+    for k, m in suspects:
+        at_kappa = kappa[k] + steps * (kappa[k + 1] - kappa[k])
+        at_beta = beta[m] + steps * (beta[m + 1] - beta[m])
+        c, s = (x[:, None] for x in components(at_kappa))
+        load = largest_load(rows, c, s, np.exp(1j * at_beta)[None, :])
+        step = (kappa[k + 1] - kappa[k] + beta[m + 1] - beta[m]) / 128
+        # ρ changes by at most p + |b| per unit of κ_n and p per radian.
+        steepest = max(row.p + abs(row.b) for row in rows)
+        if load.min() <= (steepest * step) ** 2:
+            return True
+    return False
 
 
 def _unlimited(vehicle: Vehicle) -> InvalidVehicle:

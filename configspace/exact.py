@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.limits import LoadRow, Reason, SectorRow, rows_of
-from configspace.omni_curve import components, finite
+from configspace.omni_curve import components, finite, nominal_curvature, together
 from configspace.vehicle import Vehicle
 
 __all__ = ["exact_reason", "exact_v_max"]
@@ -107,10 +107,11 @@ def exact_reason(
 def _terms(
     kappa_n: npt.ArrayLike, beta: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.complex128]]:
+    kappa_n, beta = together(
+        kappa_n=nominal_curvature(kappa_n), beta=finite("beta", beta, "rad")
+    )
     c, s = components(kappa_n)
-    e = np.exp(1j * finite("beta", beta, "rad"))
-    c, s, e = np.broadcast_arrays(c, s, e)
-    return c, s, e
+    return c, s, np.exp(1j * beta)
 
 
 def active_rows(loads: Sequence[LoadRow], reverse: bool) -> tuple[LoadRow, ...]:
@@ -137,8 +138,10 @@ def largest_load(
     e: npt.NDArray[np.complex128],
 ) -> FloatArray:
     """Return the largest squared load of all rows."""
-    loads = [load_of(row, c, s, e) for row in rows]
-    return np.asarray(np.maximum.reduce([np.zeros(c.shape), *loads]))
+    worst = np.zeros(np.broadcast_shapes(c.shape, e.shape))
+    for row in rows:
+        worst = np.maximum(worst, load_of(row, c, s, e))
+    return worst
 
 
 def _blocked(

@@ -34,6 +34,10 @@ class Grid:
     """Cells over β, 8 to 7200."""
 
     def __post_init__(self) -> None:
+        for name in ("n_kappa", "n_beta"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or isinstance(value, bool):
+                raise InvalidInput(Problem(f"grid.{name}", repr(value), "an integer"))
         if not (4 <= self.n_kappa <= 4000 and self.n_kappa % 4 == 0):
             raise InvalidInput(
                 Problem("grid.n_kappa", f"{self.n_kappa}", "a multiple of 4, 4 to 4000")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from configspace.omni_curve import components, finite
+from configspace.angles import wrap
+from configspace.omni_curve import components, finite, nominal_curvature, together
 from configspace.vehicle import Castor, FixedWheel, SteeredWheel, Vehicle
 
 __all__ = ["wheel_directions", "wheel_states"]
@@ -36,9 +37,12 @@ def wheel_directions(
     InvalidInput
         If a value is not finite or `kappa_n` is outside [-2, 2].
     """
+    kappa_n, beta = together(
+        kappa_n=nominal_curvature(kappa_n), beta=finite("beta", beta, "rad")
+    )
     c, s = components(kappa_n)
     w = np.array([wheel.position - vehicle.reference for wheel in vehicle.wheels])
-    translation = np.asarray(c * np.exp(1j * finite("beta", beta, "rad")))
+    translation = np.asarray(c * np.exp(1j * beta))
     rotation = np.asarray(1j * s * vehicle.boundary_curvature)
     return np.asarray(translation[..., None] + rotation[..., None] * w)
 
@@ -85,16 +89,16 @@ def wheel_states(
     array([1., 1., 1., 1.])
     """
     z = wheel_directions(vehicle, kappa_n, beta)
-    speed = finite("v_s", v_s, "m/s")[..., None]
-    z, speed = np.broadcast_arrays(z, speed)
+    speed = finite("v_s", v_s, "m/s")
+    speed = together(kappa_n=z[..., 0].real, v_s=speed)[1][..., None]
+    z = np.broadcast_to(z, (*speed.shape[:-1], z.shape[-1]))
     alpha = np.full(z.shape, np.nan)
     u = np.full(z.shape, np.nan)
     for i, wheel in enumerate(vehicle.wheels):
         if isinstance(wheel, Castor):
             continue
         if isinstance(wheel, SteeredWheel):
-            # Adding 0.0 turns -0.0 into 0.0, which keeps arctan2 off -π.
-            alpha[..., i] = np.arctan2(z[..., i].imag + 0.0, z[..., i].real + 0.0)
+            alpha[..., i] = wrap(np.angle(z[..., i] + 0.0))
             u[..., i] = speed[..., 0] * np.abs(z[..., i])
             continue
         roller = 0.0 if isinstance(wheel, FixedWheel) else wheel.roller

@@ -41,6 +41,18 @@ def finite(name: str, values: npt.ArrayLike, unit: str) -> FloatArray:
     return array
 
 
+def together(**arrays: FloatArray) -> tuple[FloatArray, ...]:
+    """Return arrays broadcast against each other, or raise naming their shapes."""
+    try:
+        return tuple(np.broadcast_arrays(*arrays.values()))
+    except ValueError as error:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        problem = Problem(
+            ", ".join(arrays), f"shapes {shapes}", "shapes that broadcast"
+        )
+        raise InvalidInput(problem) from error
+
+
 def nominal_curvature(kappa_n: npt.ArrayLike) -> FloatArray:
     """Return `kappa_n` as an array, or raise `InvalidInput` outside [-2, 2]."""
     array = finite("kappa_n", kappa_n, "[-2, 2]")
@@ -116,10 +128,9 @@ def to_twist(
     beta = finite("beta", beta, "rad")
     v_s = finite("v_s", v_s, "m/s")
     kappa_g = boundary_curvature(kappa_g)
-    vx, vy, omega = np.broadcast_arrays(
-        v_s * c * np.cos(beta), v_s * c * np.sin(beta), v_s * s * kappa_g
-    )
-    return np.stack([vx, vy, omega], axis=-1)
+    c, s, beta, v_s = together(c=c, s=s, beta=beta, v_s=v_s)
+    vx, vy = v_s * c * np.cos(beta), v_s * c * np.sin(beta)
+    return np.stack([vx, vy, v_s * s * kappa_g], axis=-1)
 
 
 def from_twist(
@@ -160,7 +171,7 @@ def from_twist(
     twist = finite("twist", twist, "m/s and rad/s")
     if twist.ndim == 0 or twist.shape[-1] != 3:
         raise InvalidInput(Problem("twist", f"shape {twist.shape}", "shape (..., 3)"))
-    sign = np.asarray(sign, dtype=np.float64)
+    sign = finite("sign", sign, "{-1, 1}")
     if (np.abs(sign) != 1).any():
         raise InvalidInput(Problem("sign", f"{sign}", "must be 1 or -1"))
     kappa_g = boundary_curvature(kappa_g)
@@ -189,8 +200,7 @@ def curvature_of_ratio(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
 
 def boundary_curvature(kappa_g: float) -> float:
     """Return `kappa_g`, or raise `InvalidInput` unless it is finite and positive."""
-    if not (np.isfinite(kappa_g) and kappa_g > 0):
-        raise InvalidInput(
-            Problem("kappa_g", f"{kappa_g}", "must be finite and positive, in 1/m")
-        )
-    return float(kappa_g)
+    value = finite("kappa_g", kappa_g, "1/m")
+    if value.ndim or value <= 0:
+        raise InvalidInput(Problem("kappa_g", f"{kappa_g}", "one positive number, 1/m"))
+    return float(value)

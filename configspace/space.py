@@ -16,7 +16,7 @@ from configspace.exact import LINE_TOLERANCE, exact_reason, exact_v_max
 from configspace.grid import Grid
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.limits import Reason
-from configspace.omni_curve import finite, nominal_curvature
+from configspace.omni_curve import finite, nominal_curvature, together
 from configspace.vehicle import Vehicle
 
 __all__ = ["PermissibleSpace", "SheetHeader", "Tables"]
@@ -30,7 +30,7 @@ ALGORITHM_VERSION = 1
 """Version of the numbers; raise it when building gives other tables."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tables:
     """The arrays of a data sheet, read-only.
 
@@ -104,7 +104,7 @@ def fingerprint(vehicle: Vehicle, grid: Grid) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PermissibleSpace:
     """Which (κ_n, β, v_s) a vehicle may take; build it with `build_space`.
 
@@ -203,8 +203,8 @@ class PermissibleSpace:
             If a value is not finite or `kappa_n` is outside [-2, 2].
         """
         kappa_n, beta = self._checked(kappa_n, beta)
-        kappa_n, beta, v_s = np.broadcast_arrays(
-            kappa_n, beta, finite("v_s", v_s, "m/s")
+        kappa_n, beta, v_s = together(
+            kappa_n=kappa_n, beta=beta, v_s=finite("v_s", v_s, "m/s")
         )
         bound = self.v_max(kappa_n, beta)
         if len(self.tables.load) > 1:
@@ -276,8 +276,8 @@ class PermissibleSpace:
         ----------
         kappa_low, kappa_high : (n,) float, 1, [-2, 2]
         beta_low, beta_high : (n,) float, rad
-            ``beta_low ≤ beta_high``, not wrapped; ignored for a line-mobile vehicle,
-            whose caller has made sure that β is the constant one.
+            ``beta_low ≤ beta_high``, not wrapped; anything else is `MIXED`. Ignored for
+            a line-mobile vehicle, whose caller has made sure that β is the constant.
         reverse : bool
 
         Returns
@@ -289,7 +289,13 @@ class PermissibleSpace:
         """
         load = self.tables.load[self._direction(reverse)]
         state = self.tables.state
-        _rows, columns = state.shape
+        columns = state.shape[1]
+        sound = (kappa_low >= -2) & (kappa_low <= kappa_high) & (kappa_high <= 2)
+        sound &= beta_low <= beta_high
+        kappa_low, kappa_high = (
+            np.where(sound, k, 0.0) for k in (kappa_low, kappa_high)
+        )
+        beta_low, beta_high = (np.where(sound, b, 0.0) for b in (beta_low, beta_high))
         k0, f0 = self._row(kappa_low)
         k1, f1 = self._row(kappa_high)
         if columns == 1:
@@ -297,9 +303,8 @@ class PermissibleSpace:
             m1, g1 = m0, g0
         else:
             m0, g0 = self._column(beta_low)
-            span = np.maximum(beta_high - beta_low, 0.0)
             step = 2 * np.pi / columns
-            reach = g0 + span / step * (1 + 1e-12)
+            reach = g0 + (beta_high - beta_low) / step * (1 + 1e-12)
             m1 = m0 + np.floor(reach).astype(np.int64)
             g1 = reach - np.floor(reach)
         near = (k1 - k0 <= 1) & (m1 - m0 <= 1)
@@ -328,8 +333,8 @@ class PermissibleSpace:
         at_ring = [(1 - f) * ring_load[k] + f * ring_load[k + 1] for k, f in rows_at]
         worst = np.where(ring, np.max(at_ring, axis=0), worst)
         answer = np.full(k0.shape, MIXED, np.uint8)
-        answer[all_free] = FREE
-        answer[all_blocked & near] = BLOCKED
+        answer[all_free & sound] = FREE
+        answer[all_blocked & near & sound] = BLOCKED
         return answer, (1 - 1e-14) / np.sqrt(worst)
 
     def save(self, path: str | Path) -> None:
@@ -347,8 +352,8 @@ class PermissibleSpace:
     def _checked(
         self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray]:
-        kappa_n, beta = np.broadcast_arrays(
-            nominal_curvature(kappa_n), finite("beta", beta, "rad")
+        kappa_n, beta = together(
+            kappa_n=nominal_curvature(kappa_n), beta=finite("beta", beta, "rad")
         )
         if (np.abs(beta) > np.pi).any():
             beta = wrap(beta)

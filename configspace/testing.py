@@ -305,14 +305,14 @@ def configurations() -> SearchStrategy[tuple[float, float]]:
 
 
 def grids(largest: int = 48) -> SearchStrategy[Grid]:
-    """Return a hypothesis strategy for coarse grids, quick to build."""
+    """Return a hypothesis strategy for coarse grids, from 16 × 24, quick to build."""
     from hypothesis import strategies as st
 
-    quarters = st.integers(1, max(1, largest // 4))
+    quarters = st.integers(4, max(4, largest // 4))
     return st.builds(
         lambda quarter, n_beta: Grid(4 * quarter, n_beta),
         quarters,
-        st.integers(8, max(8, largest)),
+        st.integers(24, max(24, largest)),
     )
 
 

@@ -191,4 +191,9 @@ def growth(part: Enclosure, chord: Chord, change: Change, side: int) -> Bounds:
             (np.maximum(*(weigh(n) for n in ends)) + more) / chord.near,
             np.inf,
         )
-    return low, np.minimum(steep, change.far)
+    high = np.minimum(steep, change.far)
+    # Into rest |U| only declines, out of rest it only grows, while U̇ keeps its way.
+    still = sizes[1 if side > 0 else 0] <= 1e-9
+    pull = np.abs(change.b if side > 0 else change.a)
+    lull = still & (pull > 2 * part.dt * change.bend) & (side != 0)
+    return low, np.where(lull, low, high)

@@ -36,6 +36,9 @@ __all__ = ["VehicleJudge"]
 
 FloatArray = npt.NDArray[np.float64]
 
+SEAM = 1e-9
+"""So near to a stop of a full turn either stop may be meant, rad."""
+
 
 class VehicleJudge:
     """Judges by the exact formulas of a known vehicle."""
@@ -131,6 +134,8 @@ class VehicleJudge:
             at_end = wrap(np.angle(own * chord.b) - middle)
             # The segment sweeps from start to end; its surroundings a little more.
             high = np.maximum(np.abs(start), np.abs(end)) + chord.spread()
+            if half == math.pi:
+                high = np.maximum(high, _over_the_seam(start, at_end))
             low = np.maximum(
                 np.where(rolls[0], np.abs(start), 0.0),
                 np.where(rolls[1], np.abs(at_end), 0.0),
@@ -255,3 +260,14 @@ def _yaw(part: Enclosure) -> Chord:
         np.asarray(w, dtype=np.complex128) for w in (part.omega0, part.omega1)
     )
     return Chord(first, last, radius, np.zeros_like(radius), far)
+
+
+def _over_the_seam(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return an angle beyond π where a part comes to the stops of a full turn.
+
+    Both stops are one direction, so a wheel that rounding puts just beyond one of them
+    would seem to stand at the other.
+    """
+    at_stop = [np.abs(angle) > math.pi - SEAM for angle in (start, end)]
+    comes = (at_stop[0] != at_stop[1]) | (at_stop[0] & (start * end < 0))
+    return np.where(comes, math.pi * (1 + SEAM), 0.0)

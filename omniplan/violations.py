@@ -173,6 +173,8 @@ def find_violations(
     broken = np.asarray(low > 1 + ROUNDING, dtype=bool)
     # Where one limit is surely broken the others were not pursued to the end.
     open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1, keepdims=True)
+    # With the centre of rotation on a wheel nothing more can be said of the wheel.
+    open_ &= np.isfinite(high) | np.array([row.bound == 0 for row in judge.rows])
     refused = np.asarray(broken | open_, dtype=bool)
     for column, row in enumerate(judge.rows):
         for run in _runs(refused[:, column]):

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import naive
 import numpy as np
@@ -89,11 +90,10 @@ def _stops(t: FloatArray, poses: FloatArray) -> BoolArray:
 
 
 def _spline(t: FloatArray, poses: FloatArray, rest0: bool, rest1: bool) -> CubicSpline:
-    free = "not-a-knot" if len(t) > 3 else (2, np.zeros(3))
-    rest = (1, np.zeros(3))
-    return CubicSpline(
-        t, poses, bc_type=(rest if rest0 else free, rest if rest1 else free)
-    )
+    free: Any = "not-a-knot" if len(t) > 3 else (2, np.zeros(3))
+    rest: Any = (1, np.zeros(3))
+    ends = (rest if rest0 else free, rest if rest1 else free)
+    return CubicSpline(t, poses, bc_type=ends)
 
 
 def instants(t: FloatArray, per_interval: int) -> FloatArray:

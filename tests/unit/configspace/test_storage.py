@@ -37,17 +37,24 @@ def assert_same(one: PermissibleSpace, other: PermissibleSpace) -> None:
         assert array.dtype == getattr(other.tables, name).dtype
 
 
-def forged(content: bytes, **metadata: Any) -> bytes:
-    """The same tensors under other metadata."""
+def described(content: bytes) -> tuple[dict[str, Any], dict[str, Any], bytes]:
+    """The parts of a sheet: safetensors' header, its description, the tensors."""
     size = int.from_bytes(content[:8], "little")
     header = json.loads(content[8 : 8 + size])
-    for key, value in metadata.items():
+    return header, json.loads(header["__metadata__"]["omniplan"]), content[8 + size :]
+
+
+def forged(content: bytes, **changes: Any) -> bytes:
+    """The same tensors under another description; None takes a key away."""
+    header, description, tensors = described(content)
+    for key, value in changes.items():
         if value is None:
-            del header["__metadata__"][key]
+            del description[key]
         else:
-            header["__metadata__"][key] = value
+            description[key] = value
+    header["__metadata__"]["omniplan"] = json.dumps(description)
     text = json.dumps(header).encode()
-    return len(text).to_bytes(8, "little") + text + content[8 + size :]
+    return len(text).to_bytes(8, "little") + text + tensors
 
 
 @pytest.mark.parametrize("name", configspace.catalog())
@@ -254,17 +261,17 @@ def self_consistent(content: bytes, **changes: Any) -> bytes:
 
     from configspace.storage import _checksum
 
-    size = int.from_bytes(content[:8], "little")
-    metadata = json.loads(content[8 : 8 + size])["__metadata__"]
+    _, description, _ = described(content)
     tensors = safetensors.load(content)
     for name, change in changes.items():
         if name == "header":
-            metadata["header"] = change(metadata["header"])
+            description["header"] = change(description["header"])
         elif change is None:
             del tensors[name]
         else:
             tensors[name] = np.ascontiguousarray(change(tensors[name]))
-    metadata["checksum"] = _checksum(metadata["header"], tensors)
+    description["checksum"] = _checksum(description["header"], tensors)
+    metadata = {"omniplan": json.dumps(description)}
     return bytes(safetensors.save(tensors, metadata=metadata))
 
 
@@ -272,6 +279,7 @@ def test_sheets_can_be_forged_for_these_tests(
     space: PermissibleSpace, content: bytes
 ) -> None:
     assert_same(space, configspace.parse_space(self_consistent(content)))
+    assert_same(space, configspace.parse_space(forged(content)))
 
 
 @pytest.mark.parametrize(
