@@ -319,8 +319,8 @@ def _fill_blocks(
         for k in range(k0, k1 + (k1 == c.size - 1)):
             for m in range(m0, m1 + (m1 == e.size - 1)):
                 load = 0.0
-                for r in binding:
-                    at = _load_at(kind[r], p[r], b[r], n[r], c[k], s[k], e[m])
+                for i in binding:
+                    at = _load_at(kind[i], p[i], b[i], n[i], c[k], s[k], e[m])
                     load = max(load, at)
                 nodes[k, m] = load
         for k in range(k0, k1):
@@ -381,7 +381,7 @@ def _fill_cell(
             worst = one
         why |= _REASON_SINGULAR if cos_slack[q] == -1.0 else _REASON_STEER
     low, high = 0.0, 0.0
-    largest = np.int64(-1)
+    largest = -1
     for r in binding:
         least, tops[r] = _load_range(kind[r], p[r], b[r], n[r], c0, s0, c1, s1, e0, e1)
         low = max(low, least)

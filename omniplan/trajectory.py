@@ -96,7 +96,8 @@ class Trajectory:
         step = wrap(np.diff(samples[:, 2]))
         _reject_jump(name, "theta", "the heading", step)
         samples[1:, 2] = samples[0, 2] + np.cumsum(step)
-        return cls(name, "poses", _locked(times), _locked(samples), reference_point)
+        point = _point(name, reference_point)
+        return cls(name, "poses", _locked(times), _locked(samples), point)
 
     @classmethod
     def from_twists(
@@ -124,7 +125,8 @@ class Trajectory:
             With the number of the first offending row.
         """
         times, samples = _checked(name, t, twists, COLUMNS["twists"])
-        return cls(name, "twists", _locked(times), _locked(samples), reference_point)
+        point = _point(name, reference_point)
+        return cls(name, "twists", _locked(times), _locked(samples), point)
 
     @classmethod
     def from_omni_curve(

@@ -36,7 +36,7 @@ def read_trajectories(
     """
     path = Path(path)
     try:
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidTrajectory(
             Problem(f"{path}", str(error), "a readable UTF-8 CSV file")
@@ -44,15 +44,20 @@ def read_trajectories(
     # Line numbers are kept: comments become empty rows, which the reader skips.
     text = ["" if line.lstrip().startswith("#") else line for line in lines]
     reader = csv.reader(text)
-    header = next((row for row in reader if row), None)
-    if header is None:
-        raise InvalidTrajectory(Problem(f"{path}", "no header", "a line of names"))
-    form, columns = _form(path, [name.strip() for name in header])
     groups: dict[str, list[tuple[int, list[float]]]] = {}
-    for row in reader:
-        if row:
-            name, values = _row(path, reader.line_num, row, header, columns)
-            groups.setdefault(name, []).append((reader.line_num, values))
+    try:
+        header = next((row for row in reader if row), None)
+        if header is None:
+            raise InvalidTrajectory(Problem(f"{path}", "no header", "a line of names"))
+        form, columns = _form(path, [name.strip() for name in header])
+        for row in reader:
+            if row:
+                name, values = _row(path, reader.line_num, row, header, columns)
+                groups.setdefault(name, []).append((reader.line_num, values))
+    except csv.Error as error:
+        raise InvalidTrajectory(
+            Problem(f"{path}: line {reader.line_num}", str(error), "a CSV file")
+        ) from error
     if not groups:
         raise InvalidTrajectory(Problem(f"{path}", "no rows", "at least two rows"))
     return tuple(
@@ -153,5 +158,11 @@ def write_trajectories(path: str | Path, trajectories: Iterable[Trajectory]) -> 
         writer.writerow(["trajectory", "t", *COLUMNS[trajectories[0].form]])
         for trajectory in trajectories:
             for t, sample in zip(trajectory.t, trajectory.samples, strict=True):
-                cells = (f"{value:.9g}" for value in (t, *sample))
-                writer.writerow([trajectory.name, *cells])
+                cells = (f"{value:.9g}" for value in sample)
+                writer.writerow([trajectory.name, _time(float(t)), *cells])
+
+
+def _time(t: float) -> str:
+    """Return a time with all its digits; seconds since 1970 need more than nine."""
+    short = f"{t:.9g}"
+    return short if float(short) == t else repr(t)
