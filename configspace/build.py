@@ -14,7 +14,7 @@ from configspace import cache as space_cache
 from configspace import kernels
 from configspace.errors import InvalidVehicle, Problem
 from configspace.exact import active_rows, largest_load
-from configspace.grid import Grid
+from configspace.grid import Grid, edges_of
 from configspace.limits import LoadRow, SectorRow, rows_of
 from configspace.omni_curve import components
 from configspace.space import PermissibleSpace, SheetHeader, Tables
@@ -23,7 +23,7 @@ from configspace.vehicle import Vehicle
 __all__ = ["build_space"]
 
 FloatArray = npt.NDArray[np.float64]
-_KINDS = {"disc": 0, "strip": 1, "product": 2}
+_KINDS = {"disc": 0, "strip": 1, "offset": 2, "lateral": 3, "edge": 4}
 
 
 def build_space(
@@ -72,13 +72,11 @@ def build_space(
 
 
 def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
-    line = vehicle.mobility.line_beta
-    beta = np.array([line, line]) if line is not None else grid.beta_edges
+    kappa, beta = edges_of(vehicle.mobility, grid)
     loads, sectors = rows_of(vehicle)
     directions = [active_rows(loads, False)]
     if any(row.direction == "reverse" for row in loads):
         directions.append(active_rows(loads, True))
-    kappa = grid.kappa_edges
     layers = [_layer(vehicle, rows, sectors, kappa, beta) for rows in directions]
     tables = Tables(
         load=np.stack([layer.load for layer in layers]),
@@ -86,6 +84,7 @@ def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
         v_hi=np.stack([layer.v_hi for layer in layers]),
         # Steering does not depend on the driving direction.
         state=layers[0].state,
+        parts=layers[0].parts,
         reason=np.stack([layer.reason for layer in layers]),
         wheel=np.stack([layer.wheel for layer in layers]),
     )
@@ -101,24 +100,25 @@ def _layer(
     beta: FloatArray,
 ) -> Tables:
     """Return the tables for one driving direction, without the axis of directions."""
-    c, s = components(kappa)
-    e = np.exp(1j * beta)
-    nodes, low, high, state, reason, wheel = kernels.cell_tables(
-        c, s, e, _load_table(rows), _sector_table(sectors)
+    nodes, cell_pad, low, high, state, parts, reason, wheel = kernels.cell_tables(
+        kappa, beta, _load_table(rows), _sector_table(sectors)
     )
     suspects = np.argwhere((state == kernels.FREE) & (low < 1e-12))
     if not rows or _is_unlimited(rows, suspects, kappa, beta):
         raise _unlimited(vehicle)
-    nodes += _pad(rows, c, s, beta[1] - beta[0])[:, None]
+    nodes += _pad(rows, kappa, float(beta[1] - beta[0]))[:, None]
+    nodes += _at_nodes(cell_pad)
     with np.errstate(divide="ignore"):
         slowest = np.where(state == kernels.FREE, 1 / np.sqrt(high), 0.0)
         fastest = np.where(state == kernels.BLOCKED, 0.0, 1 / np.sqrt(low))
     return Tables(
-        load=_rounded_up(nodes * (1 + 1e-14)),
+        # Never 0: a load that vanishes at a singular point is not a speed limit.
+        load=_rounded_up(np.maximum(nodes * (1 + 1e-14), 1e-30)),
         v_lo=-_rounded_up(-slowest * (1 - 1e-14)),
         # A cell around a wheel's singular point may have no bound on its speed.
         v_hi=_rounded_up(np.minimum(fastest * (1 + 1e-14), 3e38)),
         state=state,
+        parts=parts,
         reason=reason,
         wheel=wheel,
     )
@@ -130,6 +130,7 @@ def _load_table(rows: Sequence[LoadRow]) -> tuple[npt.NDArray[np.generic], ...]:
         np.array([row.p for row in rows], dtype=np.float64),
         np.array([row.b for row in rows], dtype=np.complex128),
         np.array([cmath.exp(1j * row.nu) for row in rows], dtype=np.complex128),
+        np.array([row.d for row in rows], dtype=np.float64),
         np.array([int(row.reason) for row in rows], dtype=np.int64),
         np.array([row.wheel for row in rows], dtype=np.int64),
     )
@@ -150,33 +151,50 @@ def _sector_table(rows: Sequence[SectorRow]) -> tuple[npt.NDArray[np.generic], .
             [-1.0 if math.isinf(row.half) else math.sin(row.half) for row in rows]
         ),
         np.array([row.half <= math.pi / 2 for row in rows], dtype=bool),
+        np.array([row.kappa_share for row in rows], dtype=np.float64),
+        np.array([row.beta_share for row in rows], dtype=np.float64),
         np.array([row.wheel for row in rows], dtype=np.int16),
     )
 
 
-def _pad(
-    rows: Sequence[LoadRow], c: FloatArray, s: FloatArray, width: float
-) -> FloatArray:
-    """Return what a row of nodes needs so that interpolating in β cannot be too low.
+def _pad(rows: Sequence[LoadRow], kappa: FloatArray, width: float) -> FloatArray:
+    """Return what a row of nodes needs so that interpolation cannot be too low.
 
-    A squared load is convex in κ_n, so linear interpolation there is never too low;
-    in β it is off by at most ``width²/8 max(-∂²load/∂β²)``, which is bounded in closed
-    form and grows towards one edge of each cell. A row of nodes serves the cells on
-    both sides of it, hence the largest of three neighbours.
+    Linear interpolation over a step h is off by at most ``h²/8 max(-f'')``. In κ_n
+    discs and strips are convex; lateral and edge rows are, outside |κ_n| < 1, where
+    they curve down by a constant. In β the curvature is bounded in closed form and
+    grows towards one edge of each cell. A row of nodes serves the cells on both sides
+    of it, hence the largest of three neighbours. Offset rows are padded per cell.
     """
-    curvature = np.zeros_like(c)
+    c, s = components(kappa)
+    step = kappa[1] - kappa[0]
+    largest = np.zeros_like(c)
     for row in rows:
+        along_kappa = 0.0
+        h = (row.b * cmath.exp(-1j * row.nu)).real
         if row.kind == "disc":
-            bound = 2 * c * np.abs(s) * row.p * abs(row.b)
+            over_beta = 2 * c * np.abs(s) * row.p * abs(row.b)
         elif row.kind == "strip":
-            h = abs((row.b * cmath.exp(-1j * row.nu)).real)
-            bound = 2 * (c * row.p + np.abs(s) * h) * c * row.p
+            over_beta = 2 * (c * row.p + np.abs(s) * abs(h)) * c * row.p
+        elif row.kind in {"lateral", "edge"}:
+            over_beta = row.p * np.abs(s) * c
+            bend = abs(row.b) if row.kind == "lateral" else max(0.0, -h)
+            along_kappa = 2 * row.p * bend
         else:
-            bound = np.zeros_like(c)
-        curvature = np.maximum(curvature, bound)
-    around = np.pad(curvature, 1, mode="edge")
-    largest = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
-    return width**2 / 8 * largest
+            continue
+        bound = (width**2 * over_beta + step**2 * along_kappa) / 8
+        largest = np.maximum(largest, bound)
+    around = np.pad(largest, 1, mode="edge")
+    return np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
+
+
+def _at_nodes(pad: FloatArray) -> FloatArray:
+    """Return for every node the largest of the cells that meet there."""
+    around = np.pad(pad, 1)
+    return np.maximum(
+        np.maximum(around[:-1, :-1], around[:-1, 1:]),
+        np.maximum(around[1:, :-1], around[1:, 1:]),
+    )
 
 
 def _is_unlimited(
@@ -198,7 +216,7 @@ def _is_unlimited(
         c, s = (x[:, None] for x in components(at_kappa))
         load = largest_load(rows, c, s, np.exp(1j * at_beta)[None, :])
         step = (kappa[k + 1] - kappa[k] + beta[m + 1] - beta[m]) / 128
-        # ρ changes by at most p + |b| per unit of κ_n and p per radian.
+        # What changes as fast as a disc or strip does; the others do not bound alone.
         steepest = max(row.p + abs(row.b) for row in rows)
         if load.min() <= (steepest * step) ** 2:
             return True

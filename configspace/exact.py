@@ -123,11 +123,16 @@ def load_of(
     row: LoadRow, c: FloatArray, s: FloatArray, e: npt.NDArray[np.complex128]
 ) -> FloatArray:
     """Return the squared load of one row; ``load v_s² ≤ 1`` is permitted."""
-    if row.kind == "product":
-        return np.asarray(row.p**2 * c * np.abs(s))
+    if row.kind == "lateral":
+        return np.asarray(row.p * np.abs(s) * np.abs(c * e + s * row.b))
+    if row.kind == "edge":
+        along = ((c * e + s * row.b) * np.exp(-1j * row.nu)).real
+        return np.asarray(np.maximum(row.p * s * along, 0.0))
     z = row.p * c * e + s * row.b
     if row.kind == "disc":
         return np.asarray(z.real**2 + z.imag**2)
+    if row.kind == "offset":
+        return np.asarray((np.abs(z) - s * row.d) ** 2)
     return np.asarray((z * np.exp(-1j * row.nu)).real ** 2)
 
 
@@ -158,14 +163,31 @@ def _blocked(
     if line is not None:
         off = (np.abs(wrap(np.angle(e) - line)) > LINE_TOLERANCE) & (c > 0)
         why = np.where(off, np.uint16(Reason.FIXED_WHEEL), why)
+    if vehicle.mobility.is_translating:
+        turns = np.abs(s) > LINE_TOLERANCE
+        why = np.where(turns, np.uint16(Reason.PARALLEL_WHEELS), why)
     for row in reversed(sectors):
         z = c * e + s * row.b
-        singular = np.abs(z) < 1e-12
+        singular = (np.abs(z) < 1e-12) | (turning_excess(row, c, s, e) > 0)
         why = np.where(singular, why | np.uint16(Reason.SINGULAR), why)
-        out = ~singular & (steering_excess(row, z) > 0)
+        out = (np.abs(z) >= 1e-12) & (steering_excess(row, z) > 0)
         why = np.where(out, why | np.uint16(Reason.STEER_RANGE), why)
         who = np.where(singular | out, np.int16(row.wheel), who)
     return why != 0, why, who
+
+
+def turning_excess(
+    row: SectorRow, c: FloatArray, s: FloatArray, e: npt.NDArray[np.complex128]
+) -> FloatArray:
+    """Return by how much the guaranteed rates exceed the steering rate; ≤ 0 within.
+
+    ``|∂α/∂κ_n| κ̇ + |∂α/∂β| β̇ ≤ α̇_max`` with ``∂α/∂κ_n = g / |z|²`` and
+    ``∂α/∂β = c (c + s f) / |z|²``, multiplied by |z|² (spec/omni-curve §4).
+    """
+    z = c * e + s * row.b
+    across, along = np.abs((e * row.b.conjugate()).imag), (e * row.b.conjugate()).real
+    asked = row.kappa_share * across + row.beta_share * np.abs(c * (c + s * along))
+    return np.asarray(asked - (z.real**2 + z.imag**2) - 1e-14)
 
 
 def steering_excess(row: SectorRow, z: npt.NDArray[np.complex128]) -> FloatArray:

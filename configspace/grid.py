@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace.errors import InvalidInput, Problem
+from configspace.undercarriage import Mobility
 
-__all__ = ["Grid"]
+__all__ = ["Grid", "edges_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -59,3 +60,27 @@ class Grid:
         edges = np.linspace(-np.pi, np.pi, self.n_beta + 1)
         edges.flags.writeable = False
         return edges
+
+
+def edges_of(mobility: Mobility, grid: Grid) -> tuple[FloatArray, FloatArray]:
+    """Return the edges of cells over κ_n and β for a kind of mobility.
+
+    A line-mobile vehicle has one column of cells at its β, one that cannot turn one
+    row at κ_n = 0; both have no width.
+
+    Parameters
+    ----------
+    mobility : Mobility
+    grid : Grid
+
+    Returns
+    -------
+    kappa : (k + 1,) float, 1
+    beta : (m + 1,) float, rad
+    """
+    kappa, beta = grid.kappa_edges, grid.beta_edges
+    if mobility.line_beta is not None:
+        beta = np.array([mobility.line_beta, mobility.line_beta])
+    if mobility.is_translating:
+        kappa = np.zeros(2)
+    return kappa, beta

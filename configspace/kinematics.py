@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.omni_curve import components, finite, nominal_curvature, together
-from configspace.vehicle import Castor, FixedWheel, SteeredWheel, Vehicle
+from configspace.vehicle import Castor, FixedWheel, SteerableWheel, Vehicle
 
 __all__ = ["wheel_directions", "wheel_states"]
 
@@ -41,7 +41,7 @@ def wheel_directions(
         kappa_n=nominal_curvature(kappa_n), beta=finite("beta", beta, "rad")
     )
     c, s = components(kappa_n)
-    w = np.array([wheel.position - vehicle.reference for wheel in vehicle.wheels])
+    w = np.array(vehicle.contacts) - vehicle.reference
     translation = np.asarray(c * np.exp(1j * beta))
     rotation = np.asarray(1j * s * vehicle.boundary_curvature)
     return np.asarray(translation[..., None] + rotation[..., None] * w)
@@ -97,7 +97,7 @@ def wheel_states(
     for i, wheel in enumerate(vehicle.wheels):
         if isinstance(wheel, Castor):
             continue
-        if isinstance(wheel, SteeredWheel):
+        if isinstance(wheel, SteerableWheel):
             alpha[..., i] = wrap(np.angle(z[..., i] + 0.0))
             u[..., i] = speed[..., 0] * np.abs(z[..., i])
             continue

@@ -33,7 +33,7 @@ from configspace.kernels import MIXED
 from configspace.limits import Reason
 from configspace.omni_curve import components
 from configspace.space import PermissibleSpace
-from configspace.vehicle import Castor, MecanumWheel, SteeredWheel, Wheel
+from configspace.vehicle import Castor, MecanumWheel, SteerableWheel, Wheel
 
 if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
@@ -600,7 +600,7 @@ def _draw_sketch(axes: Axes, space: PermissibleSpace) -> None:
 def _sketch_keys(wheels: Sequence[Wheel], circle: float) -> list[Artist]:
     text = rf"$1/\kappa_g$ = {circle:.2g} m"
     keys: list[Artist] = [Line2D([], [], color="0.4", ls=":", label=text)]
-    if any(isinstance(wheel, SteeredWheel) for wheel in wheels):
+    if any(isinstance(wheel, SteerableWheel) for wheel in wheels):
         keys.append(Patch(fc="C0", ec="C0", alpha=0.3, label="steering range"))
     return keys
 
@@ -621,7 +621,7 @@ def _draw_wheel(axes: Axes, wheel: Wheel, length: float) -> None:
     if isinstance(wheel, Castor):
         axes.add_patch(Circle(place, length / 4, fc="white", ec="black", zorder=3))
         return
-    if isinstance(wheel, SteeredWheel):
+    if isinstance(wheel, SteerableWheel):
         least, largest = wheel.steering_range_deg or (0.0, 360.0)
         if largest - least >= 360:
             least, largest = 0.0, 360.0

@@ -24,9 +24,9 @@ __all__ = ["PermissibleSpace", "SheetHeader", "Tables"]
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Version of the file format; raise it when the tensors or the header change."""
-ALGORITHM_VERSION = 1
+ALGORITHM_VERSION = 2
 """Version of the numbers; raise it when building gives other tables."""
 
 
@@ -35,7 +35,7 @@ class Tables:
     """The arrays of a data sheet, read-only.
 
     d is 1, or 2 where driving backwards has limits of its own; a line-mobile vehicle
-    has m = 1 column of cells.
+    has m = 1 column of cells, one that cannot turn k = 1 row.
     """
 
     load: npt.NDArray[np.float32]
@@ -47,6 +47,9 @@ class Tables:
     """(d, k, m) m/s; v_max is at most this all over the cell."""
     state: npt.NDArray[np.uint8]
     """(k, m) 0 free, 1 blocked, 2 mixed."""
+    parts: npt.NDArray[np.uint16]
+    """(k, m) which of the 4 × 4 parts of a mixed cell are free: bit 4 i + j for the
+    part i-th in κ_n and j-th in β; all bits of a free cell, none of a blocked one."""
     reason: npt.NDArray[np.uint16]
     """(d, k, m) flags of `Reason`."""
     wheel: npt.NDArray[np.int16]
@@ -69,6 +72,8 @@ class SheetHeader:
     """K in the vehicle file's frame, m."""
     line_beta: float | None
     """The constant β of a line-mobile vehicle, rad."""
+    is_translating: bool
+    """Whether only κ_n = 0 is possible, as with a synchro drive."""
     footprint: tuple[tuple[float, float], ...]
     wheel_ids: tuple[str, ...]
     grid: Grid
@@ -85,6 +90,7 @@ class SheetHeader:
             kappa_g=vehicle.boundary_curvature,
             reference=(k.real, k.imag),
             line_beta=vehicle.mobility.line_beta,
+            is_translating=vehicle.mobility.is_translating,
             footprint=vehicle.footprint,
             wheel_ids=tuple(wheel.id for wheel in vehicle.wheels),
             grid=grid,
@@ -134,6 +140,11 @@ class PermissibleSpace:
         return self.header.line_beta
 
     @property
+    def is_translating(self) -> bool:
+        """Whether only κ_n = 0 is possible."""
+        return self.header.is_translating
+
+    @property
     def grid(self) -> Grid:
         """The grid of cells."""
         return self.header.grid
@@ -172,12 +183,14 @@ class PermissibleSpace:
         row, column, fk, fb, on_line = self._locate(kappa_n, beta)
         load = self._interpolated(row, column, fk, fb, reverse)
         state = self.tables.state[row, column]
+        bit = 4 * np.minimum(4 * fk, 3).astype(int) + np.minimum(4 * fb, 3).astype(int)
+        free = (self.tables.parts[row, column] >> bit) & 1 == 1
         # 1 / sqrt may round up; one part in 2**50 keeps the promise.
-        v = np.where((state == FREE) & on_line, (1 - 1e-15) / np.sqrt(load), 0.0)
-        mixed = (state == MIXED) & on_line
-        if self.vehicle is not None and mixed.any():
-            v[mixed] = exact_v_max(
-                self.vehicle, kappa_n[mixed], beta[mixed], reverse=reverse
+        v = np.where(free & on_line, (1 - 1e-15) / np.sqrt(load), 0.0)
+        open_ = (state == MIXED) & ~free & on_line
+        if self.vehicle is not None and open_.any():
+            v[open_] = exact_v_max(
+                self.vehicle, kappa_n[open_], beta[open_], reverse=reverse
             )
         return v
 
@@ -253,8 +266,9 @@ class PermissibleSpace:
         direction = self._direction(reverse)
         why = self.tables.reason[direction, row, column]
         who = self.tables.wheel[direction, row, column]
+        off = Reason.PARALLEL_WHEELS if self.is_translating else Reason.FIXED_WHEEL
         return (
-            np.where(on_line, why, np.uint16(Reason.FIXED_WHEEL)),
+            np.where(on_line, why, np.uint16(off)),
             np.where(on_line, who, np.int16(-1)),
         )
 
@@ -298,6 +312,8 @@ class PermissibleSpace:
         beta_low, beta_high = (np.where(sound, b, 0.0) for b in (beta_low, beta_high))
         k0, f0 = self._row(kappa_low)
         k1, f1 = self._row(kappa_high)
+        if self.is_translating:
+            sound &= (kappa_low >= -LINE_TOLERANCE) & (kappa_high <= LINE_TOLERANCE)
         if columns == 1:
             m0, g0 = np.zeros_like(k0), np.zeros_like(f0)
             m1, g1 = m0, g0
@@ -309,9 +325,10 @@ class PermissibleSpace:
             g1 = reach - np.floor(reach)
         near = (k1 - k0 <= 1) & (m1 - m0 <= 1)
         left, right = m0 % columns, m1 % columns
-        corners = [state[k0, left], state[k0, right], state[k1, left], state[k1, right]]
-        all_free = np.all([x == FREE for x in corners], axis=0)
-        all_blocked = np.all([x == BLOCKED for x in corners], axis=0)
+        corners = ((k0, left), (k0, right), (k1, left), (k1, right))
+        all_free = np.all([state[at] == FREE for at in corners], axis=0)
+        all_blocked = np.all([state[at] == BLOCKED for at in corners], axis=0)
+        all_free |= self._parts_free(k0 + f0, k1 + f1, m0 + g0, m1 + g1)
         # A bilinear function is largest at a corner of a box; an edge between two
         # cells divides the box, so it counts as a corner from either side.
         over_k, over_m = (k1 > k0).astype(float), (m1 > m0).astype(float)
@@ -362,8 +379,34 @@ class PermissibleSpace:
     def _direction(self, reverse: bool) -> Literal[0, 1]:
         return 1 if reverse and len(self.tables.load) > 1 else 0
 
+    def _parts_free(
+        self,
+        k_low: FloatArray,
+        k_high: FloatArray,
+        m_low: FloatArray,
+        m_high: FloatArray,
+    ) -> BoolArray:
+        """Return whether boxes lie in two by two free parts of cells at most.
+
+        The boxes are given in cells, β not wrapped.
+        """
+        rows, columns = self.tables.state.shape
+        ends = [
+            np.floor(4 * x).astype(np.int64) for x in (k_low, k_high, m_low, m_high)
+        ]
+        i0, i1 = (np.minimum(x, 4 * rows - 1) for x in ends[:2])
+        j0, j1 = ends[2:] if columns > 1 else (np.minimum(x, 3) for x in ends[2:])
+        free = (i1 - i0 <= 1) & (j1 - j0 <= 1)
+        for i in (i0, i1):
+            for j in (j0, j1):
+                parts = self.tables.parts[i // 4, (j // 4) % columns]
+                free = free & ((parts >> (4 * (i % 4) + j % 4)) & 1 == 1)
+        return np.asarray(free)
+
     def _row(self, kappa_n: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """Return the row of cells and the place within it, 0 to 1."""
+        if self.is_translating:
+            return np.zeros(kappa_n.shape, np.int64), np.zeros(kappa_n.shape)
         position = (kappa_n + 2) * (self.grid.n_kappa / 4)
         row = np.clip(position.astype(np.int64), 0, self.grid.n_kappa - 1)
         return row, position - row
@@ -383,7 +426,10 @@ class PermissibleSpace:
         row, fk = self._row(kappa_n)
         if self.line_beta is None:
             column, fb = self._column(beta)
-            return row, column, fk, fb, np.ones(row.shape, dtype=bool)
+            on_line = np.ones(row.shape, dtype=bool)
+            if self.is_translating:
+                on_line = np.abs(kappa_n) <= LINE_TOLERANCE
+            return row, column, fk, fb, on_line
         pole = np.abs(kappa_n) == 2  # rotation about K: β has no meaning
         on_line = (np.abs(wrap(beta - self.line_beta)) <= LINE_TOLERANCE) | pole
         return row, np.zeros_like(row), fk, np.zeros_like(fk), on_line

@@ -36,6 +36,7 @@ _DTYPES = {
     "v_lo": np.float32,
     "v_hi": np.float32,
     "state": np.uint8,
+    "parts": np.uint16,
     "reason": np.uint16,
     "wheel": np.int16,
 }
@@ -161,7 +162,7 @@ def _header(text: str) -> SheetHeader:
 
 def _reject_impossible(header: SheetHeader, tables: Tables) -> None:
     """Raise ValueError unless tables and header fit: a sheet may be a stranger's."""
-    rows = header.grid.n_kappa
+    rows = 1 if header.is_translating else header.grid.n_kappa
     columns = header.grid.n_beta if header.line_beta is None else 1
     directions = tables.load.shape[0] if tables.load.ndim else 0
     if directions not in (1, 2):
@@ -172,6 +173,7 @@ def _reject_impossible(header: SheetHeader, tables: Tables) -> None:
         "v_lo": cells,
         "v_hi": cells,
         "state": cells[1:],
+        "parts": cells[1:],
         "reason": cells,
         "wheel": cells,
     }

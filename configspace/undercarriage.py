@@ -37,9 +37,13 @@ class Mobility:
     """K in the file's frame, m."""
     line_beta: float | None
     """The constant β of a line-mobile vehicle, rad; None for any β."""
+    is_translating: bool = False
+    """Whether only κ_n = 0 is possible, as with a synchro drive."""
 
 
-def mobility_of(wheels: Sequence[WheelPlace], reference: complex) -> Mobility:
+def mobility_of(
+    wheels: Sequence[WheelPlace], reference: complex, *, synchro: bool = False
+) -> Mobility:
     """Return the mobility of a set of wheels.
 
     Parameters
@@ -47,6 +51,8 @@ def mobility_of(wheels: Sequence[WheelPlace], reference: complex) -> Mobility:
     wheels : sequence of WheelPlace
     reference : complex, m
         K as the file wants it; moved to the axle line of a line-mobile vehicle.
+    synchro : bool
+        Whether all steered wheels always point alike.
 
     Raises
     ------
@@ -57,6 +63,9 @@ def mobility_of(wheels: Sequence[WheelPlace], reference: complex) -> Mobility:
         raise ValueError("wheels: only castors; at least one other wheel is needed")
     _reject_mecanum_with_driven_wheels(wheels)
     fixed = [w for w in wheels if w.type == "fixed"]
+    if synchro:
+        _reject_other_than_steered(wheels)
+        return Mobility(reference, None, is_translating=True)
     if not fixed:
         return Mobility(reference, None)
     first = fixed[0]
@@ -71,6 +80,58 @@ def mobility_of(wheels: Sequence[WheelPlace], reference: complex) -> Mobility:
     foot = first.position + along * axle
     # Keep the file's K to the last bit where it is on the axle already.
     return Mobility(reference if abs(foot - reference) < 1e-12 else foot, heading + 0.0)
+
+
+def skid_contacts(
+    wheels: Sequence[WheelPlace], effective_track: float
+) -> tuple[complex, ...]:
+    """Return the contacts of the differential drive that stands for a skid steer.
+
+    Fixed wheels move to one axle through their middle, `effective_track` apart; the
+    others stay.
+
+    Raises
+    ------
+    ValueError
+        If there are other driven wheels, or the fixed ones do not form two sides.
+    """
+    fixed = [w for w in wheels if w.type == "fixed"]
+    others = [w for w in wheels if w.type not in {"fixed", "castor"}]
+    if others or not fixed:
+        raise ValueError(
+            "wheels: a skid-steered vehicle has fixed wheels and castors only"
+            + (f"; {others[0].id} is {others[0].type}" if others else "")
+        )
+    along = cmath.exp(1j * fixed[0].heading)
+    middle = sum(w.position for w in fixed) / len(fixed)
+    contacts = []
+    sides = set()
+    for wheel in wheels:
+        if wheel.type == "castor":
+            contacts.append(wheel.position)
+            continue
+        if abs(math.remainder(wheel.heading - fixed[0].heading, math.pi)) > _ANGLE:
+            raise ValueError(
+                f"wheels: {wheel.id} does not roll along {fixed[0].id}; the wheels "
+                "of a skid-steered vehicle are parallel"
+            )
+        aside = ((wheel.position - middle) * along.conjugate()).imag
+        side = math.copysign(1.0, aside) if abs(aside) > _LENGTH else 0.0
+        sides.add(side)
+        contacts.append(middle + side * 1j * along * effective_track / 2)
+    if sides != {1.0, -1.0}:
+        raise ValueError("wheels: a skid-steered vehicle has wheels on two sides")
+    return tuple(contacts)
+
+
+def _reject_other_than_steered(wheels: Sequence[WheelPlace]) -> None:
+    steered = [w for w in wheels if w.type in {"steered", "turntable"}]
+    others = [w for w in wheels if w.type not in {"steered", "turntable", "castor"}]
+    if others or not steered:
+        raise ValueError(
+            "wheels: a synchro drive has steered wheels and castors only"
+            + (f"; {others[0].id} is {others[0].type}" if others else "")
+        )
 
 
 def _reject_second_axle(first: WheelPlace, other: WheelPlace, axle: complex) -> None:
@@ -92,7 +153,9 @@ def _reject_second_axle(first: WheelPlace, other: WheelPlace, axle: complex) -> 
 
 def _reject_mecanum_with_driven_wheels(wheels: Sequence[WheelPlace]) -> None:
     rollers = [w for w in wheels if w.type in {"mecanum", "omni"}]
-    driven = [w for w in wheels if w.type in {"steered", "fixed"} and w.driven]
+    driven = [
+        w for w in wheels if w.type in {"steered", "turntable", "fixed"} and w.driven
+    ]
     if rollers and driven:
         raise ValueError(
             f"wheels: {rollers[0].id} ({rollers[0].type}) together with the driven "

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import (
     BaseModel,
@@ -20,21 +21,33 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from configspace.undercarriage import Mobility, WheelPlace, mobility_of
+from configspace.support import support_edges
+from configspace.undercarriage import (
+    Mobility,
+    WheelPlace,
+    mobility_of,
+    skid_contacts,
+)
 
 __all__ = [
     "Castor",
     "FixedWheel",
+    "Guaranteed",
     "Limits",
+    "Load",
     "MecanumWheel",
     "OmniWheel",
+    "SkidSteer",
+    "SteerableWheel",
     "SteeredWheel",
+    "Turntable",
     "Vehicle",
     "Wheel",
 ]
 
 # Generous bounds whose only purpose is to catch millimetres, km/h and radians.
 Metres: TypeAlias = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Height: TypeAlias = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed: TypeAlias = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Acceleration: TypeAlias = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Degrees: TypeAlias = Annotated[float, Field(ge=-36000, le=36000, allow_inf_nan=False)]
@@ -71,10 +84,9 @@ class _RollingWheel(_PlacedWheel):
     )
 
 
-class SteeredWheel(_RollingWheel):
-    """A steered standard wheel; α is measured from the vehicle's x axis."""
+class SteerableWheel(_RollingWheel):
+    """What steered wheels and turntables share; α is measured from the x axis."""
 
-    type: Literal["steered"] = "steered"
     steering_range_deg: tuple[Degrees, Degrees] | None = Field(
         None, description="[least, largest] steering angle; without it it turns freely"
     )
@@ -82,12 +94,14 @@ class SteeredWheel(_RollingWheel):
     max_steering_acceleration_deg: DegreeRate | None = Field(
         None, description="degrees/s²; not judged yet, reports say so"
     )
-    offset: Annotated[float, Field(ge=0, le=0)] = Field(
-        0.0, description="lateral axle offset D, m; only 0 is supported yet"
+    steering_coupling: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = Field(
+        0.0,
+        description="where rolling and steering share their motors: metres of rolling "
+        "that one radian of steering costs, |u| + coupling |α̇| ≤ max_speed",
     )
 
     @model_validator(mode="after")
-    def _range_is_ordered(self) -> SteeredWheel:
+    def _range_is_ordered(self) -> Self:
         if self.steering_range_deg is not None:
             least, largest = self.steering_range_deg
             if least >= largest:
@@ -104,6 +118,41 @@ class SteeredWheel(_RollingWheel):
             return (-math.inf, math.inf)
         least, largest = self.steering_range_deg
         return (math.radians(least), math.radians(largest))
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Signed lateral offset D of every wheel on the steering axis, m."""
+        raise NotImplementedError
+
+
+class SteeredWheel(SteerableWheel):
+    """A steered standard wheel, on its steering axis or beside it."""
+
+    type: Literal["steered"] = "steered"
+    offset: Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)] = Field(
+        0.0,
+        description="lateral axle offset D, m; positive where the wheel stands left of "
+        "the steering axis, seen along its rolling direction",
+    )
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Signed lateral offset D, m."""
+        return (self.offset,)
+
+
+class Turntable(SteerableWheel):
+    """A turntable (Drehschemel) with two wheels on one axle, left and right of it."""
+
+    type: Literal["turntable"] = "turntable"
+    track: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = Field(
+        description="distance of the two wheels, m"
+    )
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Signed lateral offsets of the two wheels, m."""
+        return (self.track / 2, -self.track / 2)
 
 
 class FixedWheel(_RollingWheel):
@@ -161,7 +210,7 @@ class Castor(_PlacedWheel):
 
 
 Wheel: TypeAlias = Annotated[
-    SteeredWheel | FixedWheel | MecanumWheel | OmniWheel | Castor,
+    SteeredWheel | Turntable | FixedWheel | MecanumWheel | OmniWheel | Castor,
     Field(discriminator="type"),
 ]
 
@@ -175,7 +224,10 @@ class Limits(_Model):
     )
     max_yaw_rate_deg: DegreeRate | None = Field(None, description="|ω|, degrees/s")
     max_lateral_acceleration: Acceleration | None = Field(
-        None, description="centripetal acceleration |v ω| of K, m/s²"
+        None, description="centripetal acceleration |v ω|, m/s²"
+    )
+    lateral_acceleration_at: Literal["reference", "center_of_gravity"] = Field(
+        "reference", description="the point whose centripetal acceleration is meant"
     )
     max_acceleration: Acceleration | None = Field(
         None, description="increase of the speed of K, m/s²"
@@ -186,6 +238,39 @@ class Limits(_Model):
 
 
 Point: TypeAlias = tuple[Metres, Metres]
+
+
+class Load(_Model):
+    """Mass and centre of gravity of vehicle and payload together."""
+
+    mass: Annotated[float, Field(gt=0, le=1e7, allow_inf_nan=False)] | None = Field(
+        None, description="kg, for people: it cancels out of tipping"
+    )
+    center_of_gravity: tuple[Metres, Metres, Height] = Field(
+        description="(x, y, z), m, in the file's frame; z above the ground"
+    )
+    tipping_factor: Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)] = Field(
+        1.0, description="safety factor on the accelerations"
+    )
+
+
+class Guaranteed(_Model):
+    """Change rates that every permitted configuration must offer."""
+
+    kappa_rate: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = Field(
+        0.0, description="|dκ_n/dt|, 1/s"
+    )
+    beta_rate_deg: Annotated[float, Field(ge=0, le=1e5, allow_inf_nan=False)] = Field(
+        0.0, description="|dβ/dt|, degrees/s"
+    )
+
+
+class SkidSteer(_Model):
+    """A skid-steered vehicle, modelled as a differential drive."""
+
+    effective_track: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
+        description="track of the differential drive that turns alike, m"
+    )
 
 
 class Vehicle(_Model):
@@ -203,6 +288,14 @@ class Vehicle(_Model):
     footprint: tuple[Point, ...] = Field((), description="polygon, m, in file's frame")
     wheels: tuple[Wheel, ...] = Field(min_length=1, max_length=1000)
     limits: Limits = Limits()
+    load: Load | None = None
+    guaranteed: Guaranteed | None = None
+    skid_steer: SkidSteer | None = Field(
+        None, description="all fixed wheels form two sides that skid as they turn"
+    )
+    synchro: bool = Field(
+        False, description="synchro drive: all steered wheels always point alike"
+    )
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Vehicle:
@@ -210,6 +303,13 @@ class Vehicle(_Model):
         if repeated:
             raise PydanticCustomError(
                 "wheel_ids", f"wheels: id {', '.join(repeated)} is used more than once"
+            )
+        at_load = self.limits.lateral_acceleration_at == "center_of_gravity"
+        if at_load and self.load is None:
+            raise PydanticCustomError(
+                "mobility",
+                "limits.lateral_acceleration_at: center_of_gravity, but no load says "
+                "where it is",
             )
         if 0 < len(self.footprint) < 3:
             raise PydanticCustomError(
@@ -221,6 +321,9 @@ class Vehicle(_Model):
     def _mobility_and_curvature(self) -> None:
         try:
             mobility = self.mobility
+            if self.load is not None:
+                x, y, _ = self.load.center_of_gravity
+                list(support_edges([w.position for w in self.wheels], complex(x, y)))
         except ValueError as error:
             raise PydanticCustomError(
                 "mobility", str(error).replace("{", "(")
@@ -233,9 +336,18 @@ class Vehicle(_Model):
             )
 
     @cached_property
-    def mobility(self) -> Mobility:
-        """Reference point K and, for a line-mobile vehicle, the constant β."""
-        places = [
+    def contacts(self) -> tuple[complex, ...]:
+        """Where each wheel meets the ground or steers, in the file's frame, m.
+
+        Those of a skid-steered vehicle are the two wheels of the differential drive
+        that stands for it.
+        """
+        if self.skid_steer is None:
+            return tuple(wheel.position for wheel in self.wheels)
+        return skid_contacts(self._places(), self.skid_steer.effective_track)
+
+    def _places(self) -> list[WheelPlace]:
+        return [
             WheelPlace(
                 id=w.id,
                 type=w.type,
@@ -245,8 +357,16 @@ class Vehicle(_Model):
             )
             for w in self.wheels
         ]
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Reference point K and which β or κ_n the vehicle is bound to."""
         x, y = self.reference_point or (0.0, 0.0)
-        return mobility_of(places, complex(x, y))
+        places = [
+            replace(place, position=contact)
+            for place, contact in zip(self._places(), self.contacts, strict=True)
+        ]
+        return mobility_of(places, complex(x, y), synchro=self.synchro)
 
     @property
     def reference(self) -> complex:
@@ -261,16 +381,19 @@ class Vehicle(_Model):
     def _farthest(self, mobility: Mobility) -> float:
         """Return |w_i*| of the wheel with the largest |w_i| / u_lim,i."""
         rolling = [w for w in self.wheels if not isinstance(w, Castor)]
+        arms = [
+            abs(contact - mobility.reference)
+            for wheel, contact in zip(self.wheels, self.contacts, strict=True)
+            if not isinstance(wheel, Castor)
+        ]
         speeds = [w.max_speed for w in rolling]
         by_speed = not any(isinstance(w, MecanumWheel | OmniWheel) for w in rolling)
         weights = [
-            abs(w.position - mobility.reference)
-            / (u if by_speed and u is not None else 1.0)
+            arm / (u if by_speed and u is not None else 1.0)
             if u is not None or not by_speed or not any(speeds)
             else 0.0
-            for w, u in zip(rolling, speeds, strict=True)
+            for arm, u in zip(arms, speeds, strict=True)
         ]
         if not any(weights):  # all that are driven stand at K
-            weights = [abs(w.position - mobility.reference) for w in rolling]
-        star = max(range(len(rolling)), key=weights.__getitem__)
-        return abs(rolling[star].position - mobility.reference)
+            weights = arms
+        return arms[max(range(len(arms)), key=weights.__getitem__)]

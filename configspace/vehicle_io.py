@@ -23,6 +23,7 @@ from configspace.vehicle import (
     MecanumWheel,
     OmniWheel,
     SteeredWheel,
+    Turntable,
     Vehicle,
 )
 
@@ -30,6 +31,7 @@ __all__ = ["catalog", "load_vehicle", "parse_vehicle", "vehicle_schema"]
 
 _WHEELS: dict[str, type[BaseModel]] = {
     "steered": SteeredWheel,
+    "turntable": Turntable,
     "fixed": FixedWheel,
     "mecanum": MecanumWheel,
     "omni": OmniWheel,

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from configspace.angles import wrap
+from configspace.exact import LINE_TOLERANCE
 from omniplan.motion import Enclosure
 from omniplan.rows import Bounds
 
@@ -17,6 +19,7 @@ __all__ = [
     "changed",
     "ends_moving",
     "growth",
+    "off_line",
     "over",
     "scaled",
     "size",
@@ -47,9 +50,10 @@ class Chord:
         a = part.v0 + 1j * part.omega0 * point
         b = part.v1 + 1j * part.omega1 * point
         radius = part.dt**2 / 8 * (part.v_ddot + part.omega_ddot * abs(point))
-        near = np.maximum(_distance(a, b) - radius, 0.0)
-        far = np.maximum(np.abs(a), np.abs(b)) + radius
-        return cls(a, b, radius, near, far)
+        largest = np.maximum(np.abs(a), np.abs(b))
+        # A segment that ends in zero must not seem to miss it by rounding.
+        near = np.maximum(_distance(a, b) - radius - 1e-14 * largest, 0.0)
+        return cls(a, b, radius, near, largest + radius)
 
     def spread(self) -> FloatArray:
         """Return by how much a direction may stand off those of the segment, rad."""
@@ -108,6 +112,22 @@ def ends_moving(
         speed = np.maximum(np.abs(v), np.abs(omega) / kappa_g)
         ends.append(np.where(speed * scale > threshold, speed, 0.0))
     return ends[0], ends[1]
+
+
+def off_line(body: Chord, own: FloatArray, line: float) -> Bounds:
+    """Return how far β is from a line-mobile vehicle's constant, per what is rounding.
+
+    For a vehicle's own Omni-Curve-Parameters, which carry no noise: β is linear
+    between the ends of a part, so the ends tell of all of it. At a pole β has no
+    meaning.
+    """
+    off = np.maximum(
+        *(
+            np.where(np.abs(v) > 1e-12, np.abs(wrap(np.angle(own * v) - line)), 0.0)
+            for v in (body.a, body.b)
+        )
+    )
+    return off / LINE_TOLERANCE, off / LINE_TOLERANCE
 
 
 def _real(values: ComplexArray) -> ComplexArray:

@@ -397,7 +397,7 @@ def _speeds(
     s_reach = np.abs(s[1] - s[0]) / 2
     rho = np.full(radius.shape, 1e-9)
     for row in active_rows(rows_of(owner)[0], False):
-        if row.kind == "product":
+        if row.kind not in {"disc", "strip"}:
             continue
         z = row.p * v.mean(axis=0) + s.mean(axis=0) * row.b
         size = (

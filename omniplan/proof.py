@@ -31,9 +31,6 @@ SHARPNESS = 1e-3
 SHARPENING_HALVINGS = 10
 """... unless that takes more halvings than this."""
 
-CONFIGURATION_LIMITS = frozenset({"SINGULAR", "STEER_RANGE", "STEER_RATE", "BLOCKED"})
-"""Limits that are not judged while the vehicle stands."""
-
 
 @dataclass(frozen=True)
 class Parts:
@@ -71,9 +68,7 @@ class Proof:
         self._motion, self._judge, self._tolerances = motion, judge, tolerances
         ambiguous = judge.needs_configuration and not motion.is_own
         self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
-        self._free_at_rest = np.array(
-            [row.limit in CONFIGURATION_LIMITS for row in judge.rows], dtype=bool
-        )
+        self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
         spans = motion.intervals()
         self._step = spans.t1 - spans.t0
         self.parts = self._evaluate(spans)

@@ -92,8 +92,8 @@ class Report:
     duration: float
     """Duration as given, s."""
     speed_factor: float
-    """The largest factor by which the whole trajectory may be driven faster, proved;
-    below 1 it must be driven slower; 0 if no factor helps."""
+    """A factor by which the whole trajectory may be driven faster: proved by validating
+    again, and near the largest. Below 1 it must be driven slower; 0: none was found."""
     fastest_duration: float | None
     """``duration / speed_factor``, s; None if no factor helps."""
     top_speed: float

@@ -51,6 +51,8 @@ class Row:
     unit: str
     scaling: Scaling
     """How the value grows when the motion is driven faster."""
+    is_free_at_rest: bool = False
+    """Whether it is about the configuration, which is free while the vehicle stands."""
 
 
 class Judge(Protocol):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from configspace import PermissibleSpace
 from configspace.kernels import FREE
 from configspace.omni_curve import curvature_of_ratio
-from omniplan.chords import Chord, along, ends_moving, size, speed_of
+from omniplan.chords import Chord, along, ends_moving, off_line, size, speed_of
 from omniplan.motion import Enclosure
 from omniplan.rows import Bounds, Row, Tolerances
 
@@ -33,7 +33,7 @@ class SheetJudge:
         self.wheel_ids = space.header.wheel_ids
         self.needs_configuration = space.line_beta is None
         rows = [
-            Row("BLOCKED", -1, 0.0, "m/s", "none"),
+            Row("BLOCKED", -1, 0.0, "m/s", "none", True),
             Row("V_MAX", -1, 1.0, "1", "speed"),
         ]
         if space.line_beta is not None:
@@ -47,7 +47,7 @@ class SheetJudge:
         body = Chord.of(part, self.reference)
         line = self._space.line_beta
         entries: list[Bounds] = []
-        if line is not None:
+        if line is not None and not self._is_own:
             # The representation with β on the line: v_s has the sign of the motion.
             forward = (body.a + body.b) * np.exp(-1j * line)
             own = np.where(forward.real < 0, -1.0, 1.0)
@@ -90,7 +90,11 @@ class SheetJudge:
                 high = np.where(free, v_high / v_max, 0.0)
             entries.append((low, np.maximum(high, low)))
         if line is not None:
-            entries.append(self._slip(part, body, line))
+            entries.append(
+                off_line(body, own, line)
+                if self._is_own
+                else self._slip(part, body, line)
+            )
         low, high = (np.stack(column, axis=1) for column in zip(*entries, strict=True))
         return low, high
 

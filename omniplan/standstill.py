@@ -17,7 +17,7 @@ import numpy.typing as npt
 from configspace import PermissibleSpace, wheel_directions
 from configspace.angles import wrap
 from configspace.omni_curve import components, curvature_of_ratio
-from configspace.vehicle import SteeredWheel, Vehicle
+from configspace.vehicle import SteerableWheel, Vehicle
 from omniplan.judge import judge_for
 from omniplan.motion import Intervals, OmniCurveMotion
 from omniplan.proof import ROUNDING, Parts, Proof
@@ -108,6 +108,12 @@ def choose_configurations(
         }
         for p in pieces
     ]
+    # Only the best representations of a piece can be part of the best sequence that
+    # is valid, and looking for ways between configurations is dear.
+    costs = [
+        {sign: price for sign, price in cost.items() if price == min(cost.values())}
+        for cost in costs
+    ]
     changer = _Changer(judge, space, tolerances)
     changes = [
         {
@@ -115,10 +121,12 @@ def choose_configurations(
                 _configuration(parts, a.last, before, judge, at_end=True),
                 _configuration(parts, b.first, after, judge, at_end=False),
             )
-            for before in proof.signs
-            for after in proof.signs
+            for before in before_costs
+            for after in after_costs
         }
-        for a, b in itertools.pairwise(pieces)
+        for (a, before_costs), (b, after_costs) in itertools.pairwise(
+            zip(pieces, costs, strict=True)
+        )
     ]
     rests = [
         (float(parts.spans.t1[a.last]), float(parts.spans.t0[b.first]))
@@ -219,7 +227,7 @@ class _Changer:
             return -1, float(np.linalg.norm(motions[0] - motions[1]))
         turns: dict[int, float] = {}
         for i, wheel in enumerate(vehicle.wheels):
-            if not isinstance(wheel, SteeredWheel):
+            if not isinstance(wheel, SteerableWheel):
                 continue
             a, b = (_angle(vehicle, i, wheel, c) for c in (start, goal))
             free = wheel.steering_range_deg is None
@@ -274,7 +282,7 @@ def _distinct(leg: list[Configuration]) -> list[Configuration]:
     return [c for i, c in enumerate(leg) if i == 0 or c != leg[i - 1]]
 
 
-def _angle(vehicle: Vehicle, i: int, wheel: SteeredWheel, at: Configuration) -> float:
+def _angle(vehicle: Vehicle, i: int, wheel: SteerableWheel, at: Configuration) -> float:
     """Return a steering angle, rad, as it stands within the wheel's range."""
     z = complex(wheel_directions(vehicle, *at)[i])
     alpha = math.atan2(z.imag, z.real)

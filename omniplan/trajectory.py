@@ -248,7 +248,11 @@ class Trajectory:
         InvalidTrajectory
             If the samples are not poses, or row or time are out of range.
         """
-        if self.form != "poses" or not 0 <= row < self.t.size or not seconds > 0:
+        if (
+            self.form != "poses"
+            or not 0 <= row < self.t.size
+            or not 0 < seconds < math.inf
+        ):
             raise InvalidTrajectory(
                 Problem(
                     self.name,
@@ -348,6 +352,9 @@ def _checked(
     name: str, t: npt.ArrayLike, samples: npt.ArrayLike, columns: tuple[str, str, str]
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and samples as new float arrays, or raise with the row."""
+    if not 0 < len(str(name)) <= 200 or str(name).startswith("#"):
+        allowed = "a text of 1 to 200 characters that does not start with #"
+        raise InvalidTrajectory(Problem("name", repr(name)[:60], allowed))
     times, values = _numbers(name, "t", t), _numbers(name, "samples", samples)
     if times.ndim != 1 or values.shape != (times.size, 3):
         raise InvalidTrajectory(

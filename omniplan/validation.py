@@ -7,6 +7,7 @@ stays undecided at the stated resolution (see `proof`) is not permitted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from configspace import PermissibleSpace
 from configspace.omni_curve import curvature_of_ratio
-from configspace.vehicle import SteeredWheel
+from configspace.vehicle import SteerableWheel
 from omniplan.chords import Chord
 from omniplan.judge import is_own, judge_for
 from omniplan.motion import Motion, motion_of
@@ -26,6 +27,11 @@ from omniplan.trajectory import Trajectory
 from omniplan.violations import find_violations, reconfiguration_violations
 
 __all__ = ["Tolerances", "validate"]
+
+MIN_FACTOR, MAX_FACTOR = 0.01, 100.0
+"""Slower or faster than this nothing is promised."""
+FACTOR_STEPS = 6
+"""How often a factor that turns out too large is approached."""
 
 
 def validate(
@@ -66,10 +72,13 @@ def validate(
     """
     tolerances = tolerances or Tolerances()
     report = _judged(trajectory, space, tolerances)
+    factor = _proved_factor(report, trajectory, space, tolerances)
+    fastest = trajectory.duration / factor if factor > 0 else None
+    report = replace(report, speed_factor=factor, fastest_duration=fastest)
     if report.valid:
         return report
     advice = (
-        *_slow_down(report, trajectory, space, tolerances),
+        *_slow_down(report, trajectory),
         *_dwell(report, trajectory, space, tolerances),
     )
     return replace(report, advice=advice)
@@ -133,7 +142,7 @@ def _margins(parts: Parts, choice: Choice, judge: Judge) -> tuple[float, str, fl
             drivable &= bool(np.isfinite(used))
     tightest = max(worst, key=worst.__getitem__)
     factor = float(min(factors)) if drivable else 0.0
-    # Finite, so that a report can travel as JSON; nothing limits a motion that stands.
+    # Finite, so that a report can travel as JSON.
     return max(1 - worst[tightest], -1e6), tightest, min(factor, 1e6)
 
 
@@ -164,7 +173,7 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
     if vehicle is None:
         yield "change rates (not in the data sheet)"
         return
-    steered = [w for w in vehicle.wheels if isinstance(w, SteeredWheel)]
+    steered = [w for w in vehicle.wheels if isinstance(w, SteerableWheel)]
     if any(w.max_steering_acceleration_deg is not None for w in steered):
         yield "max_steering_acceleration_deg"
     if motion.has_rates:
@@ -176,18 +185,43 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
             yield f"limits.{name}"
 
 
-def _slow_down(
+def _proved_factor(
     report: Report,
     trajectory: Trajectory,
     space: PermissibleSpace,
     tolerances: Tolerances,
-) -> tuple[Advice, ...]:
+) -> float:
+    """Return a factor on the speed that validating again has proved, 0 if none.
+
+    What the utilisations promise is tried first. It may be too much, as what counts as
+    standing and as slip does not scale with the speed; then it is approached.
+    """
+    promised = min(report.speed_factor * (1 - 1e-9), MAX_FACTOR)
+    proved = 1.0 if report.valid else 0.0
+    if trajectory.form == "omni_curve":  # v_n stays in [-1, 1]
+        largest = float(np.abs(trajectory.samples[:, 2]).max())
+        promised = min(promised, 1 / max(largest, 1e-9))
+    if promised <= max(proved, MIN_FACTOR):
+        return proved
+
+    def holds(factor: float) -> bool:
+        return _judged(trajectory.scaled(factor), space, tolerances).valid
+
+    if holds(promised):
+        return promised
+    for _ in range(FACTOR_STEPS):
+        middle = math.sqrt(max(proved, MIN_FACTOR) * promised)
+        if holds(middle):
+            proved = middle
+        else:
+            promised = middle
+    return proved
+
+
+def _slow_down(report: Report, trajectory: Trajectory) -> tuple[Advice, ...]:
     """Return the advice to drive slower, if that is proved to help."""
-    # A little below the factor: it is determined to one part in a thousand.
-    factor = report.speed_factor * (1 - 2e-3)
-    if not 0.01 <= factor < 1:
-        return ()
-    if not _judged(trajectory.scaled(factor), space, tolerances).valid:
+    factor = report.speed_factor
+    if factor == 0:
         return ()
     text = (
         f"drive it at {factor:.1%} of the speed: {trajectory.duration / factor:.2f} s"

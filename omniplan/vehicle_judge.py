@@ -9,13 +9,16 @@ import numpy.typing as npt
 
 from configspace import Vehicle
 from configspace.angles import wrap
+from configspace.limits import rows_of
 from configspace.vehicle import (
     Castor,
     FixedWheel,
     MecanumWheel,
     OmniWheel,
-    SteeredWheel,
+    SteerableWheel,
 )
+from omniplan.beside import beside_axis, zone_bounds
+from omniplan.body_rows import BodyRows
 from omniplan.chords import (
     Change,
     Chord,
@@ -59,8 +62,9 @@ class VehicleJudge:
         self.reference = vehicle.reference
         self.wheel_ids = tuple(wheel.id for wheel in vehicle.wheels)
         self.needs_configuration = any(
-            isinstance(wheel, SteeredWheel) for wheel in vehicle.wheels
+            isinstance(wheel, SteerableWheel) for wheel in vehicle.wheels
         )
+        self._sectors = {row.wheel: row for row in rows_of(vehicle)[1]}
         self.rows: tuple[Row, ...] = ()
         # One evaluation on an empty part lists the rows.
         empty = np.zeros(0)
@@ -87,13 +91,13 @@ class VehicleJudge:
         for i, wheel in enumerate(self._vehicle.wheels):
             if isinstance(wheel, Castor):
                 continue
-            chord = Chord.of(part, wheel.position)
-            change = Change.of(part, wheel.position)
-            if isinstance(wheel, SteeredWheel):
+            chord = Chord.of(part, self._vehicle.contacts[i])
+            change = Change.of(part, self._vehicle.contacts[i])
+            if isinstance(wheel, SteerableWheel):
                 entries += self._steered(i, wheel, part, chord, change, own, moving)
                 gain = growth(part, chord, change, 0)
             else:
-                if isinstance(wheel, FixedWheel):
+                if isinstance(wheel, FixedWheel) and not self._is_own:
                     entries.append(self._slip(i, wheel, chord, speed))
                 # Only the component along the driven direction rolls.
                 roller = 0.0 if isinstance(wheel, FixedWheel) else wheel.roller
@@ -101,12 +105,13 @@ class VehicleJudge:
                 chord, change = along(chord, turn), changed(part, change, turn)
                 gain = size(change)
             entries += self._rolling(i, wheel, part, chord, gain)
-        return entries + self._whole(part, body, own)
+        whole = BodyRows(self._vehicle, self._tolerances, self._is_own, self._has_rates)
+        return [*entries, *whole.evaluate(part, body, own)]
 
     def _steered(
         self,
         i: int,
-        wheel: SteeredWheel,
+        wheel: SteerableWheel,
         part: Enclosure,
         chord: Chord,
         change: Change,
@@ -123,8 +128,12 @@ class VehicleJudge:
         on_wheel = ((moving[0] > 0) & ~rolls[0]) | ((moving[1] > 0) & ~rolls[1])
         singular = np.where(on_wheel, np.inf, 0.0), np.where(lost, np.inf, 0.0)
         entries: list[tuple[Row, Bounds]] = [
-            (Row("SINGULAR", i, 0.0, "m/s", "none"), singular)
+            (Row("SINGULAR", i, 0.0, "m/s", "none", True), singular)
         ]
+        row = self._sectors[i]
+        if row.kappa_share or row.beta_share:
+            zone = zone_bounds(part, row, self.kappa_g, self.reference, chord)
+            entries.append((Row("SINGULAR_ZONE", i, 1.0, "1", "none", True), zone))
         least, largest = wheel.steering_range
         if math.isfinite(largest):
             half = min((largest - least) / 2, math.pi)
@@ -140,13 +149,18 @@ class VehicleJudge:
                 np.where(rolls[0], np.abs(start), 0.0),
                 np.where(rolls[1], np.abs(at_end), 0.0),
             )
-            row = Row("STEER_RANGE", i, half, "rad", "none")
-            entries.append((row, (low / half, np.where(lost, np.inf, high / half))))
+            stop = Row("STEER_RANGE", i, half, "rad", "none", True)
+            entries.append((stop, (low / half, np.where(lost, np.inf, high / half))))
+        rate = turning(part, chord, change, (rolls[0], rolls[1]))
         if wheel.max_steering_rate_deg is not None:
             limit = math.radians(wheel.max_steering_rate_deg)
-            row = Row("STEER_RATE", i, limit, "rad/s", "speed")
-            rate = turning(part, chord, change, (rolls[0], rolls[1]))
-            entries.append((row, over(rate, limit)))
+            turn = Row("STEER_RATE", i, limit, "rad/s", "speed", True)
+            entries.append((turn, over(rate, limit)))
+        if wheel.max_speed is not None:
+            roll = Row("WHEEL_SPEED", i, wheel.max_speed, "m/s", "speed", True)
+            is_own = self._is_own
+            for bounds in beside_axis(wheel, part, chord, change, own, rate, is_own):
+                entries.append((roll, bounds))
         return entries
 
     def _slip(
@@ -167,14 +181,15 @@ class VehicleJudge:
     def _rolling(
         self,
         i: int,
-        wheel: SteeredWheel | FixedWheel | MecanumWheel | OmniWheel,
+        wheel: SteerableWheel | FixedWheel | MecanumWheel | OmniWheel,
         part: Enclosure,
         chord: Chord,
         gain: Bounds,
     ) -> list[tuple[Row, Bounds]]:
         """Return rolling speed and its change."""
         entries: list[tuple[Row, Bounds]] = []
-        if wheel.max_speed is not None and not self._is_own:
+        on_axis = not isinstance(wheel, SteerableWheel) or 0.0 in wheel.offsets
+        if wheel.max_speed is not None and on_axis and not self._is_own:
             row = Row("WHEEL_SPEED", i, wheel.max_speed, "m/s", "speed")
             entries.append((row, over(scaled(part, chord), row.bound)))
         if wheel.max_acceleration is not None and self._has_rates:
@@ -182,84 +197,6 @@ class VehicleJudge:
             row = Row("WHEEL_ACCELERATION", i, limit, "m/s²", "acceleration")
             entries.append((row, over(gain, limit)))
         return entries
-
-    def _whole(
-        self, part: Enclosure, body: Chord, own: FloatArray
-    ) -> list[tuple[Row, Bounds]]:
-        """Limits of the whole vehicle."""
-        limits = self._vehicle.limits
-        if self._is_own:  # v_n is a share of v_max, which holds all these limits
-            row = Row("V_MAX", -1, 1.0, "1", "speed")
-            share = np.maximum(part.scale0, part.scale1), part.scale_high
-            return [(row, share), *self._gains(part, body)]
-        entries: list[tuple[Row, Bounds]] = []
-        yaw = _yaw(part)
-        v, w = scaled(part, body), scaled(part, yaw)
-        if limits.max_speed is not None:
-            row = Row("SPEED", -1, limits.max_speed, "m/s", "speed")
-            entries.append((row, over(v, row.bound)))
-        if limits.max_reverse_speed is not None:
-            row = Row("REVERSE_SPEED", -1, limits.max_reverse_speed, "m/s", "speed")
-            low, high = over(v, row.bound)
-            surely, perhaps = self._backwards(body, own)
-            bounds = np.where(surely, low, 0.0), np.where(perhaps, high, 0.0)
-            entries.append((row, bounds))
-        if limits.max_yaw_rate_deg is not None:
-            limit = math.radians(limits.max_yaw_rate_deg)
-            entries.append(
-                (Row("YAW_RATE", -1, limit, "rad/s", "speed"), over(w, limit))
-            )
-        if limits.max_lateral_acceleration is not None:
-            limit = limits.max_lateral_acceleration
-            row = Row("LATERAL_ACCELERATION", -1, limit, "m/s²", "acceleration")
-            at_ends = np.maximum(
-                np.abs(body.a * yaw.a) * part.scale0**2,
-                np.abs(body.b * yaw.b) * part.scale1**2,
-            )
-            entries.append((row, over((at_ends, v[1] * w[1]), limit)))
-        return entries + self._gains(part, body)
-
-    def _gains(self, part: Enclosure, body: Chord) -> list[tuple[Row, Bounds]]:
-        """Acceleration and deceleration of K."""
-        if not self._has_rates:
-            return []
-        limits = self._vehicle.limits
-        change = Change.of(part, self.reference)
-        entries: list[tuple[Row, Bounds]] = []
-        for name, limit, side in (
-            ("ACCELERATION", limits.max_acceleration, 1),
-            ("DECELERATION", limits.max_deceleration, -1),
-        ):
-            if limit is not None:
-                row = Row(name, -1, limit, "m/s²", "acceleration")
-                entries.append((row, over(growth(part, body, change, side), limit)))
-        return entries
-
-    def _backwards(
-        self, body: Chord, own: FloatArray
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        """Return whether a part is driven backwards somewhere: surely, possibly.
-
-        A line-mobile vehicle drives backwards where K moves against its constant β,
-        any other where v_s < 0.
-        """
-        line = self._vehicle.mobility.line_beta
-        if line is None:
-            return own < 0, own < 0
-        floor = self._tolerances.standstill
-        forward = [(x * np.exp(-1j * line)).real for x in (body.a, body.b)]
-        least = np.minimum(*forward)
-        return least < -floor, least - body.radius < -floor
-
-
-def _yaw(part: Enclosure) -> Chord:
-    """Return ω as a chord on the real axis."""
-    radius = part.dt**2 / 8 * part.omega_ddot
-    far = np.maximum(np.abs(part.omega0), np.abs(part.omega1)) + radius
-    first, last = (
-        np.asarray(w, dtype=np.complex128) for w in (part.omega0, part.omega1)
-    )
-    return Chord(first, last, radius, np.zeros_like(radius), far)
 
 
 def _over_the_seam(start: FloatArray, end: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +12,8 @@ import numpy.typing as npt
 from configspace import PermissibleSpace, Reason
 from configspace.angles import wrap
 from configspace.omni_curve import curvature_of_ratio
-from configspace.vehicle import SteeredWheel
-from omniplan.motion import Motion, PoseMotion
+from configspace.vehicle import SteerableWheel
+from omniplan.motion import Enclosure, Motion, PoseMotion
 from omniplan.proof import ROUNDING, Parts
 from omniplan.report import Violation
 from omniplan.rows import Judge, Row
@@ -88,9 +88,9 @@ class _Describer:
         if limit == "STEER_RANGE":
             value, bound = self._angle(row, place)
         elif limit == "SINGULAR":
-            position = self._space.vehicle.wheels[wheel].position  # type: ignore[union-attr]
+            position = self._space.vehicle.contacts[wheel]  # type: ignore[union-attr]
             value = abs(place.v + 1j * place.omega * position)
-        elif limit == "FIXED_WHEEL":
+        elif limit in {"FIXED_WHEEL", "PARALLEL_WHEELS"} and unit == "1":
             value, bound, unit = math.asin(min(value, 1.0)), math.asin(bound), "rad"
         elif limit in {"BLOCKED", "V_MAX"} and self._space.vehicle is None:
             limit, wheel, bound = self._by_sheet(place)
@@ -130,10 +130,10 @@ class _Describer:
         vehicle = self._space.vehicle
         assert vehicle is not None
         wheel = vehicle.wheels[row.wheel]
-        assert isinstance(wheel, SteeredWheel)
+        assert isinstance(wheel, SteerableWheel)
         least, largest = wheel.steering_range
         middle = (least + largest) / 2
-        z = place.v + 1j * place.omega * wheel.position
+        z = place.v + 1j * place.omega * vehicle.contacts[row.wheel]
         aside = float(wrap(np.angle(z) - middle))
         return middle + aside, middle + math.copysign(row.bound, aside)
 
@@ -176,6 +176,9 @@ def find_violations(
     # With the centre of rotation on a wheel nothing more can be said of the wheel.
     open_ &= np.isfinite(high) | np.array([row.bound == 0 for row in judge.rows])
     refused = np.asarray(broken | open_, dtype=bool)
+    if not refused.any():
+        return
+    at_end = _worse_at_end(judge, parts, sign)
     for column, row in enumerate(judge.rows):
         for run in _runs(refused[:, column]):
             reached = low[run, column]
@@ -183,10 +186,10 @@ def find_violations(
             ranked = reached if is_proved else high[run, column]
             part = int(run[int(np.argmax(ranked))])
             ends = [
-                describer.place(parts, part, at_end, int(sign[part]))
-                for at_end in (False, True)
+                describer.place(parts, part, tail, int(sign[part]))
+                for tail in (False, True)
             ]
-            place = ends[_worse_end(judge, parts, part, column, int(sign[part]))]
+            place = ends[int(at_end[part, column])]
             span = float(parts.spans.t0[run[0]]), float(parts.spans.t1[run[-1]])
             ratio = float(ranked.max())
             yield describer.violation(row, place, span, ratio, is_proved=is_proved)
@@ -242,18 +245,28 @@ def _runs(mask: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.int64]]:
     return np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
 
 
-def _worse_end(judge: Judge, parts: Parts, part: int, column: int, sign: int) -> int:
-    """Return at which end of a part a row is utilised more: 0 start, 1 end."""
-    e = parts.enclosure
-    ends = []
-    for tail in ("0", "1"):
-        fields = {
-            name: getattr(e, name.removesuffix("0").removesuffix("1") + tail)[[part]]
-            if name[-1] in "01"
-            else getattr(e, name)[[part]]
-            for name in vars(e)
-        }
-        fields["dt"] = np.zeros(1)
-        low, _ = judge.utilisation(type(e)(**fields), sign)
-        ends.append(float(low[0, column]))
-    return int(ends[1] > ends[0])
+def _worse_at_end(
+    judge: Judge, parts: Parts, sign: npt.NDArray[np.int64]
+) -> npt.NDArray[np.bool_]:
+    """Return whether each row is utilised more at the end of a part, (m, rows)."""
+    lows = [
+        Parts(parts.spans, part, parts.stands, *_bounds(judge, part)).picked(sign)[0]
+        for part in (_only(parts.enclosure, "0"), _only(parts.enclosure, "1"))
+    ]
+    return np.asarray(lows[1] > lows[0], dtype=bool)
+
+
+def _bounds(
+    judge: Judge, part: Enclosure
+) -> tuple[dict[int, FloatArray], dict[int, FloatArray]]:
+    found = {sign: judge.utilisation(part, sign) for sign in (1, -1)}
+    return ({s: b[0] for s, b in found.items()}, {s: b[1] for s, b in found.items()})
+
+
+def _only(part: Enclosure, end: str) -> Enclosure:
+    """Return the parts shrunk to their start ("0") or their end ("1")."""
+    fields = {
+        name: getattr(part, name[:-1] + end) if name[-1] in "01" else value
+        for name, value in vars(part).items()
+    }
+    return replace(part, **{**fields, "dt": np.zeros_like(part.dt)})

@@ -16,6 +16,10 @@ _WHAT = {
     "SPEED": "speed",
     "REVERSE_SPEED": "speed backwards",
     "YAW_RATE": "yaw rate",
+    "SINGULAR_ZONE": "steering needed for the guaranteed rates, as a share of its own",
+    "TIPPING": "acceleration of the centre of gravity towards a side",
+    "PARALLEL_WHEELS": "turning of a vehicle whose wheels all point alike",
+    "UNREACHABLE": "configuration",
     "LATERAL_ACCELERATION": "lateral acceleration",
     "FIXED_WHEEL": "sideways slip of a wheel that does not steer",
     "STEER_RATE": "steering rate",
@@ -48,7 +52,9 @@ def _numbers(violation: Violation) -> str:
     bound = quantity(violation.bound, violation.unit)
     if violation.limit == "SINGULAR":
         allowed = "must not be 0"
-    elif violation.limit == "STEER_RANGE" and violation.bound < 0:
+    elif violation.limit == "STEER_RANGE" and (
+        (violation.value < violation.bound) == violation.is_proved
+    ):  # a value that is only possible lies within the stop
         allowed = f"at least {bound} permitted"
     else:
         allowed = f"at most {bound} permitted"

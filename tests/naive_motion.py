@@ -162,7 +162,7 @@ class Simulation:
         ux, uy = self.wheel_velocity(i)
         if isinstance(wheel, SteeredWheel):
             return np.hypot(ux, uy)
-        delta = math.radians(wheel.heading_deg)
+        delta = math.radians(getattr(wheel, "heading_deg", 0.0))
         gamma = math.radians(getattr(wheel, "roller_deg", 0.0))
         along = ux * math.cos(delta + gamma) + uy * math.sin(delta + gamma)
         return along / math.cos(gamma)

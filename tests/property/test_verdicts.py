@@ -157,7 +157,7 @@ def assert_pieces_are_sound(seed: int, vehicles: int, each: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_valid_pieces_are_permitted_all_along(seed: int) -> None:
-    assert_pieces_are_sound(seed, vehicles=60, each=20)
+    assert_pieces_are_sound(seed, vehicles=50, each=20)
 
 
 @pytest.mark.slow
@@ -329,7 +329,9 @@ def test_a_proved_violation_is_found_there_by_the_simulation(
 def assert_is_taken(case: Case, violation: Violation) -> None:
     """The value is taken at the time named, from one side of it or the other."""
     assert violation.value is not None
-    if violation.limit != "SINGULAR":
+    if violation.limit == "STEER_RANGE":
+        assert is_outside(case.vehicle, violation)
+    elif violation.limit != "SINGULAR":
         assert violation.excess > 1
     assert violation.t_start <= violation.t <= violation.t_end
     t = case.trajectory.t
@@ -345,6 +347,18 @@ def assert_is_taken(case: Case, violation: Violation) -> None:
     assert any(
         np.isclose(value, violation.value, rtol=2e-3, atol=2e-4) for value in values
     ), (violation, values)
+
+
+def is_outside(vehicle: Vehicle, violation: Violation) -> bool:
+    """Whether the angle is outside the range, which ends at the bound."""
+    (wheel,) = (w for w in vehicle.wheels if w.id == violation.wheel)
+    assert isinstance(wheel, SteeredWheel)
+    assert wheel.steering_range_deg is not None
+    assert violation.value is not None
+    least, largest = map(math.radians, wheel.steering_range_deg)
+    full = largest - least >= 2 * math.pi
+    at_bound = full or min(abs(violation.bound - x) for x in (least, largest)) < 1e-9
+    return at_bound and not least <= violation.value <= largest
 
 
 def value_of(here: naive_motion.Simulation, violation: Violation) -> float:
@@ -449,7 +463,7 @@ def test_a_reversed_trajectory_has_the_same_verdict_where_limits_are_symmetric(
     form: str, seed: int
 ) -> None:
     judged = 0
-    for case in cases(seed + 10, form, vehicles=36, each=3):
+    for case in cases(seed + 10, form, vehicles=60, each=3):
         limits = case.vehicle.limits
         if limits.max_reverse_speed is not None:
             continue
@@ -483,7 +497,9 @@ def test_at_the_speed_factor_a_motion_is_valid(form: str, seed: int) -> None:
         report = validate(case.trajectory, case.space)
         if report.speed_factor > 0:
             scaled = case.trajectory.scaled(report.speed_factor * 0.998)
-            assert validate(scaled, case.space).valid
+            limits = {v.limit for v in validate(scaled, case.space).violations}
+            # See test_validation: a standstill shrinks by more than the factor.
+            assert limits <= {"RECONFIGURATION"}
             faster += report.valid
             slower += not report.valid
         if not report.valid:
@@ -519,7 +535,7 @@ def test_advice_makes_the_trajectory_valid(form: str, seed: int) -> None:
 def test_a_foreign_omni_curve_motion_is_judged_by_its_twists() -> None:
     rng = np.random.default_rng(70)
     valid = 0
-    for _ in range(40):
+    for _ in range(30):
         owner, judged = random_vehicle(rng), with_rates(rng, random_vehicle(rng))
         space = configspace.build_space(judged, COARSE, cache=False)
         line = naive.constant_beta(owner)
@@ -557,7 +573,7 @@ def test_a_foreign_omni_curve_motion_is_judged_by_its_twists() -> None:
             trajectory = Trajectory.from_omni_curve(t, k, b, v_n, owner)
             if not validate(trajectory, space).valid:
                 continue
-            simulation = naive_motion.simulate(judged, t, twist_at, 100)
+            simulation = naive_motion.simulate(judged, t, twist_at, 40)
             rates = {"ACCELERATION", "DECELERATION", "WHEEL_ACCELERATION"}
             found = [x for x in simulation.breaches() if x.limit not in rates]
             assert found == []
