@@ -17,6 +17,7 @@ from configspace.exact import active_rows, largest_load
 from configspace.grid import Grid, edges_of
 from configspace.limits import LoadRow, SectorRow, rows_of
 from configspace.omni_curve import components
+from configspace.rate_cells import build_cell_rates
 from configspace.space import PermissibleSpace, SheetHeader, Tables
 from configspace.vehicle import Vehicle
 
@@ -89,7 +90,10 @@ def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
         wheel=np.stack([layer.wheel for layer in layers]),
     )
     header = SheetHeader.of(vehicle, grid)
-    return PermissibleSpace(header=header, tables=tables, vehicle=vehicle)
+    # Change rates vary slowly enough for a grid of a quarter of the cells each way.
+    coarse = Grid(max(grid.n_kappa // 16 * 4, 4), max(grid.n_beta // 4, 8))
+    rates = build_cell_rates(vehicle, coarse)
+    return PermissibleSpace(header=header, tables=tables, rates=rates, vehicle=vehicle)
 
 
 def _layer(

@@ -126,10 +126,17 @@ def build_cell_rates(vehicle: Vehicle, grid: Grid | None = None) -> CellRates:
         bounds[1] = 0.0
     if vehicle.mobility.is_translating:
         bounds[0] = 0.0
-    single = [_rounded_down(bound) for bound in bounds[:5]]
-    load = -_rounded_down(-bounds[5])  # the one that must not be too small
-    kappa_headroom, beta_headroom = np.split(_rounded_down(bounds[6:]), 2)
-    return CellRates(*single, load, kappa_headroom, beta_headroom)
+    kappa_headroom, beta_headroom = np.split(bounds[6:], 2)
+    return CellRates(
+        kappa_steer=_rounded_down(bounds[0]),
+        beta_steer=_rounded_down(bounds[1]),
+        kappa_accel=_rounded_down(bounds[2]),
+        beta_accel=_rounded_down(bounds[3]),
+        v_s_dot=_rounded_down(bounds[4]),
+        headroom_load=-_rounded_down(-bounds[5]),  # the one not to be too small
+        kappa_headroom=_rounded_down(kappa_headroom),
+        beta_headroom=_rounded_down(beta_headroom),
+    )
 
 
 def cell_rate_limits(

@@ -6,7 +6,7 @@ import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,12 @@ from configspace.grid import Grid
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.limits import Reason
 from configspace.omni_curve import finite, nominal_curvature, together
+from configspace.rate_cells import CellRates, cell_rate_limits
+from configspace.rates import rate_limits
 from configspace.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["PermissibleSpace", "SheetHeader", "Tables"]
 
@@ -121,6 +126,7 @@ class PermissibleSpace:
 
     header: SheetHeader
     tables: Tables
+    rates: CellRates
     vehicle: Vehicle | None = None
     """The vehicle; None for a space that was read from a data sheet."""
 
@@ -242,6 +248,64 @@ class PermissibleSpace:
             Flags of `Reason`: exact where the vehicle is known, else those of the cell.
         """
         return self.explain(kappa_n, beta, reverse=reverse)[0]
+
+    def rate_limits(
+        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, v_n: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how fast each parameter may change while the other two rest.
+
+        Exact where the vehicle is known, else what all of the cell offers at least.
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        v_n : (...,) float, 1, [-1, 1]
+
+        Returns
+        -------
+        kappa_n_dot : (...,) float, 1/s
+        beta_dot : (...,) float, rad/s
+        v_n_dot : (...,) float, 1/s
+            Infinite where no limit bounds it, 0 where the configuration is blocked.
+
+        Raises
+        ------
+        InvalidInput
+            If a value is not finite or `kappa_n` is outside [-2, 2].
+
+        References
+        ----------
+        Brenner and Colomb 2022, section 4.6; spec/omni-curve §4.
+        """
+        kappa_n, beta = self._checked(kappa_n, beta)
+        kappa_n, beta, v_n = together(
+            kappa_n=kappa_n, beta=beta, v_n=finite("v_n", v_n, "[-1, 1]")
+        )
+        v_max = np.where(
+            v_n < 0,
+            self.v_max(kappa_n, beta, reverse=True),
+            self.v_max(kappa_n, beta),
+        )
+        if self.vehicle is not None:
+            found = rate_limits(self.vehicle, kappa_n, beta, v_n, v_max)
+        else:
+            row, column = self.rates.locate(kappa_n, beta)
+            found = cell_rate_limits(self.rates, row, column, v_n, v_max)
+        kappa_n_dot, beta_dot, v_n_dot = (np.where(v_max > 0, x, 0.0) for x in found)
+        return kappa_n_dot, beta_dot, v_n_dot
+
+    def to_mesh(self) -> trimesh.Trimesh:
+        """Return the permissible set over (κ_n, β, v) as a closed solid.
+
+        A vehicle that is bound to a line or cannot turn gets a flat ribbon. See
+        `configspace.mesh`.
+        """
+        from configspace import mesh
+
+        if self.line_beta is not None or self.is_translating:
+            return mesh.to_ribbon(self)
+        return mesh.to_mesh(self)
 
     def explain(
         self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, *, reverse: bool = False

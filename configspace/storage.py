@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import secrets
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from configspace.errors import CacheError
 from configspace.grid import Grid
 from configspace.kernels import MIXED
 from configspace.omni_curve import boundary_curvature
+from configspace.rate_cells import SHARES, CellRates
 from configspace.space import (
     ALGORITHM_VERSION,
     FORMAT_VERSION,
@@ -40,6 +41,8 @@ _DTYPES = {
     "reason": np.uint16,
     "wheel": np.int16,
 }
+_RATES = tuple(field.name for field in fields(CellRates))
+_PREFIX = "rates."
 
 
 def dump_space(space: PermissibleSpace) -> bytes:
@@ -47,6 +50,8 @@ def dump_space(space: PermissibleSpace) -> bytes:
     tensors = {
         name: np.ascontiguousarray(getattr(space.tables, name)) for name in _DTYPES
     }
+    for name in _RATES:
+        tensors[_PREFIX + name] = np.ascontiguousarray(getattr(space.rates, name))
     header = json.dumps(asdict(space.header), sort_keys=True)
     description = {
         "format": _FORMAT,
@@ -128,9 +133,11 @@ def parse_space(content: bytes, subject: str = "data sheet") -> PermissibleSpace
         header = _header(header_text)
         tables = Tables(**{name: tensors[name] for name in _DTYPES})
         _reject_impossible(header, tables)
+        rates = CellRates(**{name: tensors[_PREFIX + name] for name in _RATES})
+        _reject_impossible_rates(header, rates)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CacheError(f"{subject}: damaged: {error!r}") from error
-    return PermissibleSpace(header=header, tables=tables)
+    return PermissibleSpace(header=header, tables=tables, rates=rates)
 
 
 def _metadata(content: bytes, subject: str) -> dict[str, str]:
@@ -193,6 +200,23 @@ def _reject_impossible(header: SheetHeader, tables: Tables) -> None:
     numbers = (*header.reference, header.line_beta or 0.0)
     if not np.isfinite(numbers).all():
         raise ValueError("the header's numbers must be finite")
+
+
+def _reject_impossible_rates(header: SheetHeader, rates: CellRates) -> None:
+    """Raise ValueError unless the change rates fit the header."""
+    rows, columns = rates.v_s_dot.shape
+    one_row, one_column = header.is_translating, header.line_beta is not None
+    if (rows == 1) != one_row or (columns == 1) != one_column:
+        raise ValueError(f"change rates over {rows} × {columns} cells")
+    if not one_row and rows % 4:
+        raise ValueError(f"change rates over {rows} rows")
+    for name in _RATES:
+        array = getattr(rates, name)
+        stacked = (SHARES.size,) if name.endswith("headroom") else ()
+        if array.shape != (*stacked, rows, columns) or array.dtype != np.float32:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}")
+        if not (array >= 0).all():
+            raise ValueError(f"{name} must not be negative")
 
 
 def _checksum(header: str, tensors: dict[str, npt.NDArray[np.generic]]) -> str:
