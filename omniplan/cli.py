@@ -122,9 +122,11 @@ def _parser() -> argparse.ArgumentParser:
     query.add_argument("--connect", default=DEFAULT_ENDPOINT, help="%(default)s")
     query.add_argument("--timeout", type=float, default=10.0, help="%(default)s s")
 
-    export = command("export", _export, "write a vehicle's data sheet")
+    export = command("export", _export, "write a vehicle's data sheet or its solid")
     export.add_argument("vehicle", help="catalogue name or vehicle file")
-    export.add_argument("output", type=Path, help="FILE.safetensors")
+    export.add_argument(
+        "output", type=Path, help="FILE.safetensors, or FILE.glb, .stl, .ply for a mesh"
+    )
 
     schema = command("schema", _schema, "print a JSON Schema")
     schema.add_argument("what", choices=["vehicle"])
@@ -270,7 +272,13 @@ def _query(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    _space(options.vehicle).save(options.output)
+    space = _space(options.vehicle)
+    if options.output.suffix == ".safetensors":
+        space.save(options.output)
+    else:
+        from configspace.mesh import export
+
+        export(space.to_mesh(), options.output)
     _say(f"wrote {options.output}", options.json)
     return YES
 

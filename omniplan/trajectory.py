@@ -13,6 +13,7 @@ twists (vx, vy, ω)      linear in the body twist
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -161,7 +162,7 @@ class Trajectory:
         """
         labels = COLUMNS["omni_curve"]
         columns = [
-            _numbers(name, label, column)
+            _numbers(name, (label,), column)
             for label, column in zip(labels, (kappa_n, beta, v_n), strict=True)
         ]
         if len({column.shape for column in columns}) > 1:
@@ -321,24 +322,39 @@ class Trajectory:
         return build(data["t"], data[form], name=name, reference_point=point)
 
 
-def _numbers(name: str, what: str, values: npt.ArrayLike) -> FloatArray:
-    """Return a new float array, or raise unless all values are numbers."""
+def _numbers(name: str, labels: tuple[str, ...], values: npt.ArrayLike) -> FloatArray:
+    """Return a new float array, or raise unless all values are numbers.
+
+    `labels` name the columns of a table, or the one of a list.
+    """
     try:
         array = np.array(values)
-    except (TypeError, ValueError) as error:  # rows of different lengths
+    except (TypeError, ValueError) as error:
         raise InvalidTrajectory(
-            Problem(f"{name}: {what}", "rows of different lengths", "a regular array")
+            Problem(name, "rows of different lengths", f"{', '.join(labels)} in each")
         ) from error
     if array.size and array.dtype.kind not in "fiu":
-        raise InvalidTrajectory(
-            Problem(f"{name}: {what}", "values that are not numbers", "numbers only")
-        )
+        raise InvalidTrajectory(_not_a_number(name, labels, array))
     return array.astype(np.float64)
+
+
+def _not_a_number(
+    name: str, labels: tuple[str, ...], array: npt.NDArray[np.generic]
+) -> Problem:
+    """Return where the first value stands that is not a number."""
+    for place, value in np.ndenumerate(array):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or abs(value) > sys.float_info.max:
+            known = len(place) > 1 and place[1] < len(labels)
+            label = labels[place[1]] if known else ", ".join(labels)
+            where = f"{name}: row {place[0]}, {label}" if place else f"{name}: {label}"
+            return Problem(where, repr(value)[:60], "must be a number")
+    return Problem(name, "values that are not numbers", "numbers only")
 
 
 def _point(name: str, value: Any) -> tuple[float, float]:
     if isinstance(value, list | tuple) and len(value) == 2:
-        x, y = _numbers(name, "reference_point", value)
+        x, y = _numbers(name, ("reference_point",), value)
         if abs(x) <= 100 and abs(y) <= 100:
             return float(x), float(y)
     raise InvalidTrajectory(
@@ -355,7 +371,7 @@ def _checked(
     if not 0 < len(str(name)) <= 200 or str(name).startswith("#"):
         allowed = "a text of 1 to 200 characters that does not start with #"
         raise InvalidTrajectory(Problem("name", repr(name)[:60], allowed))
-    times, values = _numbers(name, "t", t), _numbers(name, "samples", samples)
+    times, values = _numbers(name, ("t",), t), _numbers(name, columns, samples)
     if times.ndim != 1 or values.shape != (times.size, 3):
         raise InvalidTrajectory(
             Problem(

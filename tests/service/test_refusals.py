@@ -76,12 +76,12 @@ def test_a_malformed_message_is_refused(
 TRAJECTORIES: dict[str, tuple[dict[str, object], str]] = {
     "one sample": ({"t": [0], "poses": [[0, 0, 0]]}, "at least two"),
     "no samples": ({"t": [], "poses": []}, "shape"),
-    "texts": ({"t": ["a", "b"], "poses": [[0, 0, 0]] * 2}, "numbers"),
+    "texts": ({"t": ["a", "b"], "poses": [[0, 0, 0]] * 2}, "row 0, t"),
     "time stands still": ({"t": [1, 1], "poses": [[0, 0, 0]] * 2}, "row 1, t"),
     "too large": ({"t": [0, 1], "poses": [[0, 0, 0], [0, 1e400, 0]]}, ""),
     "null": ({"t": [0, 1], "poses": [[0, 0, 0], [0, None, 0]]}, "row 1, y"),
     "two forms": ({"t": [0, 1], "poses": [], "twists": []}, "exactly one"),
-    "ragged": ({"t": [0, 1], "poses": [[0, 0, 0], [0, 0]]}, "numbers"),
+    "ragged": ({"t": [0, 1], "poses": [[0, 0, 0], [0, 0]]}, "different lengths"),
     "jump": ({"t": [0, 1], "poses": [[0, 0, 0], [0, 0, 3]]}, "row 1, theta"),
     "unknown key": ({"t": [0, 1], "poses": [[0, 0, 0]] * 2, "v": 1}, "unknown key v"),
 }

@@ -117,7 +117,7 @@ def test_the_top_is_v_max_and_the_bottom_that_of_driving_backwards() -> None:
         assert inside.mean() > 0.9
         assert (np.abs(v[on]) <= truth)[inside].all()
         assert np.abs(v[on])[inside] == pytest.approx(truth[inside], rel=1e-2)
-    assert mesh.bounds[0, 2] > -0.61
+    assert v[np.abs(kappa) < 1].min() >= -0.3  # K's speed is c v_s: more beyond
 
 
 def test_the_walls_stand_on_the_border(ift: PermissibleSpace) -> None:
