@@ -5,11 +5,11 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 import configspace
 import omniplan
-from omniplan.demo import manoeuvres
+from omniplan.demo import DEMO_FLEET, manoeuvres
 from services import Client, Server
 
 
-@pytest.mark.parametrize("name", configspace.catalog()[:4])
+@pytest.mark.parametrize("name", DEMO_FLEET)
 def test_validate_the_manoeuvres(benchmark: BenchmarkFixture, name: str) -> None:
     """Eight manoeuvres of 100 to 280 samples."""
     space = configspace.build_space(configspace.load_vehicle(name))

@@ -7,8 +7,9 @@ when one is asked for. Everything random comes from a passed `numpy.random.Gener
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,22 +17,29 @@ import numpy.typing as npt
 from configspace.grid import Grid
 from configspace.omni_curve import from_twist
 from configspace.space import PermissibleSpace
+from configspace.testing_vehicles import (
+    ALL_KINDS,
+    VEHICLE_KINDS,
+    VehicleKind,
+    random_vehicle,
+)
 from configspace.vehicle import (
     Castor,
     FixedWheel,
     MecanumWheel,
     OmniWheel,
-    SteeredWheel,
+    SteerableWheel,
     Vehicle,
 )
-from configspace.vehicle_io import vehicle_from_data
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
 __all__ = [
+    "ALL_KINDS",
     "VEHICLE_KINDS",
     "RigidBody",
+    "VehicleKind",
     "assert_sound",
     "configurations",
     "grids",
@@ -42,46 +50,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-VehicleKind: TypeAlias = Literal[
-    "steered", "mixed", "differential", "ackermann", "mecanum", "omni"
-]
-
-VEHICLE_KINDS: tuple[VehicleKind, ...] = get_args(VehicleKind)
-"""The kinds of undercarriage that `random_vehicle` builds."""
-
-
-def random_vehicle(
-    rng: np.random.Generator, kind: VehicleKind | None = None
-) -> Vehicle:
-    """Return a random vehicle whose speed is bounded everywhere.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    kind : str, optional
-        One of `VEHICLE_KINDS`; default any.
-
-    Examples
-    --------
-    >>> random_vehicle(np.random.default_rng(0), "mecanum").wheels[0].type
-    'mecanum'
-    """
-    kind = kind or VEHICLE_KINDS[int(rng.integers(len(VEHICLE_KINDS)))]
-    wheels, always_bounded = _WHEELS[kind](rng)
-    for i in range(int(rng.integers(3))):
-        x, y = _point(rng)
-        wheels.append({"id": f"castor-{i}", "type": "castor", "x": x, "y": y})
-    order = rng.permutation(len(wheels))
-    data: dict[str, Any] = {
-        "name": f"random-{kind}",
-        "wheels": [wheels[i] for i in order],
-        "limits": _random_limits(rng, always_bounded),
-    }
-    if rng.random() < 0.4:
-        data["reference_point"] = _point(rng, 0.3)
-    if rng.random() < 0.2:
-        data["kappa_g"] = float(rng.uniform(0.5, 8.0))
-    return vehicle_from_data(data)
+BoolArray = npt.NDArray[np.bool_]
 
 
 def random_configurations(
@@ -112,7 +81,7 @@ def random_configurations(
     kappa_n = np.where(case == 5, kinks + near, kappa_n)
     seams = rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], count)
     beta = np.where((case == 6) | ((case == 5) & (near > 0)), seams + near, beta)
-    steered = [w for w in vehicle.wheels if isinstance(w, SteeredWheel)]
+    steered = [w for w in vehicle.wheels if isinstance(w, SteerableWheel)]
     if steered:
         pick = rng.integers(0, len(steered), count)
         w = np.array([wheel.position - vehicle.reference for wheel in steered])[pick]
@@ -132,9 +101,20 @@ def random_configurations(
         sine = s * (b * np.exp(-1j * ends)).imag / np.maximum(c, 1e-9)
         bend = np.arcsin(np.clip(sine, -1, 1))
         beta = np.where(case >= 8, ends - bend + near, beta)
+        reach = np.array([wheel.offsets[0] for wheel in steered])[pick]
+        if reach.any():
+            # The centre of rotation under the wheel, beside its axis: it stands still.
+            spot = w + reach * np.exp(1j * rng.uniform(-np.pi, np.pi, count))
+            still = np.stack([omega * spot.imag, -omega * spot.real, omega], axis=-1)
+            on_k, on_beta, _ = from_twist(still, vehicle.boundary_curvature)
+            here = (case == 7) & (rng.random(count) < 0.5)
+            kappa_n = np.where(here, on_k + apart, kappa_n)
+            beta = np.where(here, on_beta + near, beta)
     line = vehicle.mobility.line_beta
     if line is not None:
         beta = np.where(rng.random(count) < 0.9, line, beta)
+    if vehicle.mobility.is_translating:
+        kappa_n = np.where(rng.random(count) < 0.9, 0.0, kappa_n)
     return np.clip(kappa_n, -2, 2), beta
 
 
@@ -148,17 +128,48 @@ class RigidBody:
     """(...,) rad, the least room to a steering stop; negative where blocked."""
     stillness: FloatArray
     """(...,) the least speed of a steered wheel per v_s; 0 at a singular point."""
+    spare: FloatArray
+    """(...,) the least |u|² less what the guaranteed rates need of it, per v_s²;
+    negative in the singular zone."""
 
     @property
     def permitted(self) -> FloatArray:
         """(...,) m/s, v_max or 0 where blocked."""
-        open_ = (self.margin >= 0) & (self.stillness > 1e-12)
+        open_ = (self.margin >= 0) & (self.stillness > 1e-12) & (self.spare >= 0)
         return np.where(open_, self.v_max, 0.0)
 
-    def is_clear(self, room: float = 1e-9) -> npt.NDArray[np.bool_]:
+    @property
+    def slack(self) -> FloatArray:
+        """(...,) rad, rounding: an angle is as exact as the wheel's speed."""
+        return 4e-15 / np.maximum(self.stillness, 1e-15) + 3e-14
+
+    @property
+    def is_blocked(self) -> BoolArray:
+        """(...,) whether blocked by more than rounding."""
+        return np.asarray(
+            (self.margin < -self.slack)
+            | (self.stillness < 1e-13)
+            | (self.spare < -_SPARE_ROUNDING)
+        )
+
+    @property
+    def is_open(self) -> BoolArray:
+        """(...,) whether permitted by more than rounding."""
+        return np.asarray(
+            (self.margin > self.slack)
+            & (self.stillness > 1e-9)
+            & (self.spare > _SPARE_ROUNDING)
+        )
+
+    def is_clear(self, room: float = 1e-9) -> BoolArray:
         """(...,) whether permitted or blocked by more than rounding."""
         fine = np.minimum(self.stillness, 1.0) * np.minimum(np.abs(self.margin), 1.0)
+        fine = np.minimum(fine, np.abs(self.spare))
         return np.asarray((fine > room) & (self.stillness > room))
+
+
+_SPARE_ROUNDING = 1e-12
+_GRAVITY = 9.81
 
 
 def rigid_body(
@@ -170,7 +181,8 @@ def rigid_body(
 ) -> RigidBody:
     """Return permitted speeds by the rigid-body formula, without cells or tables.
 
-    Written apart from `configspace.limits` and `configspace.exact` on purpose.
+    Written apart from `configspace.limits` and `configspace.exact` on purpose. The
+    wheels do not turn about their steering axes: α̇ = 0.
 
     Parameters
     ----------
@@ -192,40 +204,155 @@ def rigid_body(
     slowest = np.full(kappa_n.shape, np.inf)
     margin = np.full(kappa_n.shape, np.inf)
     stillness = np.full(kappa_n.shape, np.inf)
+    spare = np.full(kappa_n.shape, np.inf)
     k = vehicle.reference
     with np.errstate(divide="ignore", over="ignore"):
         for wheel in vehicle.wheels:
             if isinstance(wheel, Castor):
                 continue
-            ux = vx - omega * (wheel.y - k.imag)
-            uy = vy + omega * (wheel.x - k.real)
-            if isinstance(wheel, SteeredWheel):
+            x, y = _ground_point(vehicle, wheel)
+            ux, uy = vx - omega * (y - k.imag), vy + omega * (x - k.real)
+            if isinstance(wheel, SteerableWheel):
                 u = np.hypot(ux, uy)
                 stillness = np.minimum(stillness, u)
                 margin = np.minimum(margin, _room(wheel, np.arctan2(uy, ux)))
+                need = _needed(vehicle, wheel, kappa_n, beta, (ux, uy))
+                spare = np.minimum(spare, u**2 - need if need is not None else np.inf)
+                u = np.maximum.reduce([np.abs(u - omega * d) for d in wheel.offsets])
             else:
                 u = _rolling(wheel, ux, uy)
             if wheel.max_speed is not None:
                 slowest = np.minimum(slowest, wheel.max_speed / np.abs(u))
-        limits = vehicle.limits
-        if limits.max_speed is not None:
-            slowest = np.minimum(slowest, limits.max_speed / v)
-        if limits.max_reverse_speed is not None and reverse:
-            slowest = np.minimum(slowest, limits.max_reverse_speed / v)
-        if limits.max_yaw_rate_deg is not None:
-            rate = math.radians(limits.max_yaw_rate_deg)
-            slowest = np.minimum(slowest, rate / np.abs(omega))
-        if limits.max_lateral_acceleration is not None:
-            sideways = limits.max_lateral_acceleration / np.abs(v * omega)
-            slowest = np.minimum(slowest, np.sqrt(sideways))
+        slowest = np.minimum(slowest, _body_bound(vehicle, vx, vy, omega, reverse))
     line = vehicle.mobility.line_beta
+    off = np.zeros(kappa_n.shape)
     if line is not None:
-        off = np.abs(np.angle(np.exp(1j * (beta - line))))
         turning = np.abs(kappa_n) < 2
-        # About a nano-radian beside the line is rounding: neither clear.
-        margin = np.where(turning & (off > 5e-10), np.minimum(margin, 0.0), margin)
-        margin = np.where(turning & (off > 2e-9), np.minimum(margin, -off), margin)
-    return RigidBody(slowest, margin, stillness)
+        off = np.where(turning, np.abs(np.angle(np.exp(1j * (beta - line)))), 0.0)
+    if vehicle.mobility.is_translating:
+        off = np.abs(kappa_n)
+    # About a nano-radian beside the line is rounding: neither clear.
+    margin = np.where(off > 5e-10, np.minimum(margin, 0.0), margin)
+    margin = np.where(off > 2e-9, np.minimum(margin, -off), margin)
+    return RigidBody(slowest, margin, stillness, spare)
+
+
+def _ground_point(
+    vehicle: Vehicle, wheel: SteerableWheel | FixedWheel | MecanumWheel | OmniWheel
+) -> tuple[float, float]:
+    """Return where a wheel touches the ground, or its steering axis does."""
+    if vehicle.skid_steer is None:
+        return wheel.x, wheel.y
+    # The whole side stands beside the middle, at half the effective track.
+    fixed = [w for w in vehicle.wheels if isinstance(w, FixedWheel)]
+    mx = sum(w.x for w in fixed) / len(fixed)
+    my = sum(w.y for w in fixed) / len(fixed)
+    left = (-math.sin(fixed[0].heading), math.cos(fixed[0].heading))
+    is_left = (wheel.x - mx) * left[0] + (wheel.y - my) * left[1] > 0
+    arm = vehicle.skid_steer.effective_track / 2 * (1 if is_left else -1)
+    return mx + arm * left[0], my + arm * left[1]
+
+
+def _needed(
+    vehicle: Vehicle,
+    wheel: SteerableWheel,
+    kappa_n: FloatArray,
+    beta: FloatArray,
+    u: tuple[FloatArray, FloatArray],
+) -> FloatArray | None:
+    """Return the |u|² at which a wheel just follows the guaranteed rates.
+
+    ``α̇ = (ux u̇y - uy u̇x) / |u|²``, the rates of κ_n and β with the worse signs. The
+    velocity changes linearly with κ_n on each branch and turns with β.
+    """
+    if vehicle.guaranteed is None or wheel.max_steering_rate_deg is None:
+        return None
+    gentle = np.abs(kappa_n) < 1
+    side = np.copysign(1.0, kappa_n)
+    kg, k = vehicle.boundary_curvature, vehicle.reference
+    size = np.where(gentle, 1.0, 2 - np.abs(kappa_n))
+    along = (np.cos(beta), np.sin(beta))
+    by_kappa = (
+        np.where(gentle, -kg * (wheel.y - k.imag), -side * along[0]),
+        np.where(gentle, kg * (wheel.x - k.real), -side * along[1]),
+    )
+    by_beta = (-size * along[1], size * along[0])
+    turn_kappa = np.abs(u[0] * by_kappa[1] - u[1] * by_kappa[0])
+    turn_beta = np.abs(u[0] * by_beta[1] - u[1] * by_beta[0])
+    rates = vehicle.guaranteed
+    asked = turn_kappa * rates.kappa_rate
+    asked = asked + turn_beta * math.radians(rates.beta_rate_deg)
+    return np.asarray(asked / math.radians(wheel.max_steering_rate_deg))
+
+
+def _body_bound(
+    vehicle: Vehicle,
+    vx: FloatArray,
+    vy: FloatArray,
+    omega: FloatArray,
+    reverse: bool,
+) -> FloatArray:
+    """Return the largest |v_s| by the limits of the whole vehicle."""
+    limits, v = vehicle.limits, np.hypot(vx, vy)
+    bound = np.full(v.shape, np.inf)
+    if limits.max_speed is not None:
+        bound = np.minimum(bound, limits.max_speed / v)
+    if limits.max_reverse_speed is not None and reverse:
+        bound = np.minimum(bound, limits.max_reverse_speed / v)
+    if limits.max_yaw_rate_deg is not None:
+        rate = math.radians(limits.max_yaw_rate_deg)
+        bound = np.minimum(bound, rate / np.abs(omega))
+    px = py = 0.0
+    if vehicle.load is not None:
+        px = vehicle.load.center_of_gravity[0] - vehicle.reference.real
+        py = vehicle.load.center_of_gravity[1] - vehicle.reference.imag
+        drift = (vx - omega * py, vy + omega * px)
+        # Centripetal acceleration ω x v per v_s²; the ground pushes the other way.
+        push = (omega * drift[1], -omega * drift[0])
+        factor = vehicle.load.center_of_gravity[2] * vehicle.load.tipping_factor
+        shift = tuple(factor / _GRAVITY * p for p in push)
+        bound = np.minimum(bound, np.sqrt(_way_out(vehicle, shift)))
+    if limits.max_lateral_acceleration is not None:
+        if limits.lateral_acceleration_at == "center_of_gravity":
+            v = np.hypot(vx - omega * py, vy + omega * px)
+        sideways = limits.max_lateral_acceleration / np.abs(v * omega)
+        bound = np.minimum(bound, np.sqrt(sideways))
+    return np.asarray(bound)
+
+
+def _way_out(vehicle: Vehicle, shift: Sequence[FloatArray]) -> FloatArray:
+    """Return how often `shift` fits between centre of gravity and polygon's edge."""
+    assert vehicle.load is not None
+    px, py, _ = vehicle.load.center_of_gravity
+    corners = _hull([(w.x, w.y) for w in vehicle.wheels])
+    times = np.full(shift[0].shape, np.inf)
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        ex, ey = bx - ax, by - ay
+        # Inside is left of the edge; the area shrinks by `closing` with every shift.
+        area = ex * (py - ay) - ey * (px - ax)
+        closing = ey * shift[0] - ex * shift[1]
+        leaves = closing > 0
+        time = area / np.where(leaves, closing, 1.0)
+        times = np.where(leaves, np.minimum(times, time), times)
+    return times
+
+
+def _hull(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the corners of the convex hull, counter-clockwise, by gift wrapping."""
+    start = here = min(points)
+    corners: list[tuple[float, float]] = []
+    while not corners or here != start:
+        corners.append(here)
+        there = here
+        for p in points:
+            ax, ay = there[0] - here[0], there[1] - here[1]
+            bx, by = p[0] - here[0], p[1] - here[1]
+            turn = ax * by - ay * bx
+            farther = math.hypot(bx, by) > math.hypot(ax, ay)
+            if turn < 0 or (turn == 0 and farther):
+                there = p
+        here = there
+    return corners
 
 
 def assert_sound(
@@ -258,10 +385,9 @@ def assert_sound(
     for reverse in (False, True):
         truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
         promised = space.v_max(kappa_n, beta, reverse=reverse)
-        # Rounding only: an angle is as exact as the wheel's speed lets it be.
-        slack = 4e-15 / np.maximum(truth.stillness, 1e-15) + 3e-14
-        blocked = (truth.margin < -slack) | (truth.stillness < 1e-13)
-        _fail_where(blocked & (promised > 0), "blocked but permitted", kappa_n, beta)
+        _fail_where(
+            truth.is_blocked & (promised > 0), "blocked but permitted", kappa_n, beta
+        )
         too_fast = promised > truth.v_max * (1 + 1e-12)
         _fail_where(too_fast, "faster than permitted", kappa_n, beta)
         v_s = -promised if reverse else promised
@@ -272,7 +398,7 @@ def assert_sound(
         taken = space.contains(kappa_n, beta, over)
         _fail_where(moves & taken, "more than v_max is taken", kappa_n, beta)
         if space.vehicle is not None:
-            refused = truth.is_clear() & (truth.margin > 0) & (promised <= 0)
+            refused = truth.is_clear() & (truth.permitted > 0) & (promised <= 0)
             _fail_where(refused, "clearly permitted but refused", kappa_n, beta)
 
 
@@ -317,7 +443,7 @@ def grids(largest: int = 48) -> SearchStrategy[Grid]:
 
 
 def _fail_where(
-    wrong: npt.NDArray[np.bool_], what: str, kappa_n: FloatArray, beta: FloatArray
+    wrong: BoolArray, what: str, kappa_n: FloatArray, beta: FloatArray
 ) -> None:
     if wrong.any():
         first = tuple(np.argwhere(wrong)[0])
@@ -336,7 +462,7 @@ def _rolling(
     return np.asarray((ux * math.cos(angle) + uy * math.sin(angle)) / math.cos(gamma))
 
 
-def _room(wheel: SteeredWheel, alpha: FloatArray) -> FloatArray:
+def _room(wheel: SteerableWheel, alpha: FloatArray) -> FloatArray:
     """Return how far α is within the steering range, negative outside, rad."""
     least, largest = wheel.steering_range
     if largest - least >= 2 * math.pi:
@@ -346,198 +472,3 @@ def _room(wheel: SteeredWheel, alpha: FloatArray) -> FloatArray:
     inside = np.minimum(past, width - past)
     outside = -np.minimum(past - width, 2 * math.pi - past)
     return np.where(past <= width, inside, outside)
-
-
-def _point(rng: np.random.Generator, size: float = 1.0) -> tuple[float, float]:
-    x, y = rng.uniform(-size, size, 2)
-    return float(x), float(y)
-
-
-def _speed(rng: np.random.Generator) -> float:
-    return float(rng.uniform(0.3, 3.0))
-
-
-def _random_limits(rng: np.random.Generator, optional: bool) -> dict[str, float]:
-    """Return limits; speed and yaw rate at least, unless they are `optional`."""
-
-    def chosen(share: float) -> bool:
-        return bool(rng.random() < share)
-
-    limits: dict[str, float] = {}
-    if not optional or chosen(0.4):
-        limits["max_speed"] = _speed(rng)
-    if chosen(0.3):
-        limits["max_reverse_speed"] = _speed(rng)
-    if not optional or chosen(0.3):
-        limits["max_yaw_rate_deg"] = float(rng.uniform(20, 300))
-    if chosen(0.3):
-        limits["max_lateral_acceleration"] = float(rng.uniform(0.2, 5.0))
-    return limits
-
-
-def _random_range(rng: np.random.Generator) -> tuple[float, float] | None:
-    """Return a steering range, degrees: of every shape that the spec names."""
-    match int(rng.integers(9)):
-        case 0:
-            return None
-        case 1:  # symmetric
-            half = float(rng.uniform(20, 175))
-            return -half, half
-        case 2:  # asymmetric
-            return float(-rng.uniform(5, 170)), float(rng.uniform(5, 170))
-        case 3:  # one-sided
-            return 0.0, float(rng.uniform(30, 180))
-        case 4:  # narrow
-            return float(-rng.uniform(0.1, 3)), float(rng.uniform(0.1, 3))
-        case 5:  # more than half a turn, off centre
-            least = float(rng.uniform(-300, 0))
-            return least, least + float(rng.uniform(185, 359))
-        case 6:  # several turns
-            return float(-rng.uniform(180, 700)), float(rng.uniform(180, 700))
-        case 7:  # ends at round numbers
-            ends = ((-90.0, 90.0), (-180.0, 180.0), (0.0, 180.0), (-90.0, 270.0))
-            return ends[int(rng.integers(4))]
-        case _:  # the other way round
-            return float(rng.uniform(90, 170)), float(rng.uniform(190, 270))
-
-
-def _steered(
-    rng: np.random.Generator,
-    name: str,
-    driven: bool,
-    steering_range: tuple[float, float] | None = None,
-) -> dict[str, Any]:
-    x, y = _point(rng)
-    wheel: dict[str, Any] = {"id": name, "type": "steered", "x": x, "y": y}
-    if driven:
-        wheel["max_speed"] = _speed(rng)
-    if steering_range is not None:
-        wheel["steering_range_deg"] = steering_range
-    return wheel
-
-
-def _steered_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
-    """All wheels steered and driven."""
-    count = int(rng.integers(1, 9))
-    same = _random_range(rng)
-    alike = rng.random() < 0.5
-    wheels = [
-        _steered(rng, f"w{i}", True, same if alike else _random_range(rng))
-        for i in range(count)
-    ]
-    if rng.random() < 0.3 and count % 2 == 0:  # a rectangle, as real vehicles have
-        for i, wheel in enumerate(wheels):
-            wheel["x"] = (0.4 + 0.2 * (i // 4)) * (1 if i % 2 else -1)
-            wheel["y"] = 0.25 * (1 if i // 2 % 2 else -1)
-    return wheels, count > 1
-
-
-def _mixed_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
-    """Steered wheels of which some are passive."""
-    count = int(rng.integers(2, 7))
-    driven = int(rng.integers(0, count))
-    wheels = [
-        _steered(rng, f"w{i}", i < driven, _random_range(rng)) for i in range(count)
-    ]
-    return wheels, driven > 1
-
-
-def _axle(
-    rng: np.random.Generator, passive: bool
-) -> tuple[list[dict[str, Any]], float, complex]:
-    """Two fixed wheels on one axle line, rotated and off the origin at times."""
-    heading = float(rng.uniform(-180, 180)) if rng.random() < 0.5 else 0.0
-    middle = complex(*_point(rng, 0.5)) if rng.random() < 0.5 else 0j
-    along = complex(0, 1) * complex(
-        math.cos(math.radians(heading)), math.sin(math.radians(heading))
-    )
-    wheels = []
-    for i, offset in enumerate((rng.uniform(0.1, 0.8), -rng.uniform(0.1, 0.8))):
-        place = middle + float(offset) * along
-        turned = 180.0 if rng.random() < 0.2 else 0.0
-        wheel: dict[str, Any] = {
-            "id": f"fixed-{i}",
-            "type": "fixed",
-            "x": place.real,
-            "y": place.imag,
-            "heading_deg": heading + turned,
-        }
-        if not passive:
-            wheel["max_speed"] = _speed(rng)
-        wheels.append(wheel)
-    return wheels, heading, middle
-
-
-def _differential_wheels(
-    rng: np.random.Generator,
-) -> tuple[list[dict[str, Any]], bool]:
-    wheels, _, _ = _axle(rng, passive=False)
-    return wheels, True
-
-
-def _ackermann_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
-    wheels, heading, middle = _axle(rng, passive=rng.random() < 0.3)
-    half = float(rng.uniform(20, 110))
-    ahead = complex(math.cos(math.radians(heading)), math.sin(math.radians(heading)))
-    for i in range(int(rng.integers(1, 4))):
-        shift = complex(float(rng.uniform(0.3, 1.2)), float(rng.uniform(-0.4, 0.4)))
-        place = middle + shift * ahead
-        forward = (
-            heading if abs(heading) <= 90 else heading - math.copysign(180, heading)
-        )
-        wheel = _steered(
-            rng, f"steered-{i}", rng.random() < 0.5, (forward - half, forward + half)
-        )
-        wheels.append({**wheel, "x": place.real, "y": place.imag})
-    return wheels, False
-
-
-def _mecanum_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
-    wheels = []
-    gamma = 45.0 if rng.random() < 0.6 else float(rng.uniform(20, 70))
-    turned = 0.0 if rng.random() < 0.6 else float(rng.uniform(-180, 180))
-    for axle in range(1 if rng.random() < 0.5 else 2):
-        x, y = rng.uniform(0.15, 1.0, 2)
-        for i, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
-            wheels.append(
-                {
-                    "id": f"m{axle}{i}",
-                    "type": "mecanum",
-                    "x": float(sx * x),
-                    "y": float(sy * y),
-                    "heading_deg": turned,
-                    "roller_deg": -gamma * sx * sy,
-                    "max_speed": _speed(rng),
-                }
-            )
-    return wheels, True
-
-
-def _omni_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
-    count = int(rng.integers(3, 5))
-    start = float(rng.uniform(0, 360))
-    wheels = []
-    for i in range(count):
-        angle = start + 360 / count * i
-        r = float(rng.uniform(0.15, 0.6))
-        wheels.append(
-            {
-                "id": f"o{i}",
-                "type": "omni",
-                "x": r * math.cos(math.radians(angle)),
-                "y": r * math.sin(math.radians(angle)),
-                "heading_deg": angle + 90,
-                "max_speed": _speed(rng),
-            }
-        )
-    return wheels, True
-
-
-_WHEELS = {
-    "steered": _steered_wheels,
-    "mixed": _mixed_wheels,
-    "differential": _differential_wheels,
-    "ackermann": _ackermann_wheels,
-    "mecanum": _mecanum_wheels,
-    "omni": _omni_wheels,
-}

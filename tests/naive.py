@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,9 @@ from configspace.vehicle import (
     FixedWheel,
     MecanumWheel,
     OmniWheel,
+    SteerableWheel,
     SteeredWheel,
+    Turntable,
     Vehicle,
 )
 
@@ -67,15 +69,32 @@ def from_twist(
 # --- section 3.2 and the reference point
 
 
+def ground(vehicle: Vehicle) -> list[tuple[float, float]]:
+    """Where every wheel counts: for a skid steer, half its track beside the middle."""
+    if vehicle.skid_steer is None:
+        return [(wheel.x, wheel.y) for wheel in vehicle.wheels]
+    fixed = [w for w in vehicle.wheels if isinstance(w, FixedWheel)]
+    mx, my = sum(w.x for w in fixed) / len(fixed), sum(w.y for w in fixed) / len(fixed)
+    angle = math.radians(fixed[0].heading_deg) + math.pi / 2
+    points = []
+    for wheel in vehicle.wheels:
+        if isinstance(wheel, Castor):
+            points.append((wheel.x, wheel.y))
+            continue
+        aside = (wheel.x - mx) * math.cos(angle) + (wheel.y - my) * math.sin(angle)
+        arm = sgn(aside) * vehicle.skid_steer.effective_track / 2
+        points.append((mx + arm * math.cos(angle), my + arm * math.sin(angle)))
+    return points
+
+
 def reference(vehicle: Vehicle) -> tuple[float, float]:
     """K: as the file says, or its foot on the axle line of the fixed wheels."""
     kx, ky = vehicle.reference_point or (0.0, 0.0)
-    for wheel in vehicle.wheels:
+    for wheel, (x, y) in zip(vehicle.wheels, ground(vehicle), strict=True):
         if isinstance(wheel, FixedWheel):
             heading = math.radians(wheel.heading_deg)
             # Move K along the rolling direction until it is beside the wheel.
-            ahead = (wheel.x - kx) * math.cos(heading)
-            ahead += (wheel.y - ky) * math.sin(heading)
+            ahead = (x - kx) * math.cos(heading) + (y - ky) * math.sin(heading)
             return kx + ahead * math.cos(heading), ky + ahead * math.sin(heading)
     return kx, ky
 
@@ -98,10 +117,10 @@ def kappa_g(vehicle: Vehicle) -> float:
     kx, ky = reference(vehicle)
     rollers = any(isinstance(w, MecanumWheel | OmniWheel) for w in vehicle.wheels)
     best, distance = -1.0, 0.0
-    for wheel in vehicle.wheels:
+    for wheel, (x, y) in zip(vehicle.wheels, ground(vehicle), strict=True):
         if isinstance(wheel, Castor):
             continue
-        r = math.hypot(wheel.x - kx, wheel.y - ky)
+        r = math.hypot(x - kx, y - ky)
         if rollers:
             quotient = r
         elif wheel.max_speed is None:
@@ -112,8 +131,8 @@ def kappa_g(vehicle: Vehicle) -> float:
             best, distance = quotient, r
     if distance == 0:  # no driven wheel apart from K: any other that rolls
         distance = max(
-            math.hypot(w.x - kx, w.y - ky)
-            for w in vehicle.wheels
+            math.hypot(x - kx, y - ky)
+            for w, (x, y) in zip(vehicle.wheels, ground(vehicle), strict=True)
             if not isinstance(w, Castor)
         )
     return 1 / distance
@@ -188,11 +207,14 @@ class Answer:
     """Room to the nearest steering stop or to being off the line, rad; < 0 blocked."""
     stillness: float
     """Least speed of a steered wheel per v_s; 0 at a singular point."""
+    spare: float
+    """Largest steering rate less what the guaranteed rates ask, per the former."""
 
     @property
     def permitted(self) -> float:
         """v_max, or 0 where blocked."""
-        return self.v_max if self.margin >= 0 and self.stillness > 1e-12 else 0.0
+        open_ = self.margin >= 0 and self.stillness > 1e-12 and self.spare >= 0
+        return self.v_max if open_ else 0.0
 
 
 def exact(
@@ -202,23 +224,31 @@ def exact(
     kg = kappa_g(vehicle)
     kx, ky = reference(vehicle)
     vx, vy, omega = twist(kappa_n, beta, 1.0, kg)
-    bound, margin, stillness = math.inf, math.inf, math.inf
+    bound, margin, stillness, spare = math.inf, math.inf, math.inf, math.inf
     line = constant_beta(vehicle)
     if line is not None and abs(kappa_n) != 2:
         off = abs(math.remainder(beta - line, 2 * math.pi))
         margin = min(margin, 2e-9 - off)
-    for wheel in vehicle.wheels:
+    if vehicle.synchro:
+        margin = min(margin, 2e-9 - abs(kappa_n))
+    for wheel, (x, y) in zip(vehicle.wheels, ground(vehicle), strict=True):
         if isinstance(wheel, Castor):
             continue
-        ux = vx - omega * (wheel.y - ky)
-        uy = vy + omega * (wheel.x - kx)
-        u = rolling(wheel, ux, uy)
-        if wheel.max_speed is not None and u != 0:
-            bound = min(bound, wheel.max_speed / abs(u))
-        if isinstance(wheel, SteeredWheel):
-            stillness = min(stillness, math.hypot(ux, uy))
+        ux, uy = vx - omega * (y - ky), vy + omega * (x - kx)
+        for u in rolling_speeds(wheel, ux, uy, omega):
+            if wheel.max_speed is not None and u != 0:
+                bound = min(bound, wheel.max_speed / abs(u))
+        if isinstance(wheel, SteerableWheel):
+            still = math.hypot(ux, uy)
+            stillness = min(stillness, still)
             if wheel.steering_range_deg is not None:
                 margin = min(margin, room(wheel, math.atan2(uy, ux)))
+            if vehicle.guaranteed and wheel.max_steering_rate_deg and still > 1e-9:
+                by_kappa, by_beta = angle_rates(vehicle, wheel, kappa_n, beta, still)
+                asked = abs(by_kappa) * vehicle.guaranteed.kappa_rate
+                asked += abs(by_beta) * math.radians(vehicle.guaranteed.beta_rate_deg)
+                rate = math.radians(wheel.max_steering_rate_deg)
+                spare = min(spare, (rate - asked) / rate)
     limits = vehicle.limits
     v = math.hypot(vx, vy)
     if limits.max_speed is not None and v > 0:
@@ -227,17 +257,123 @@ def exact(
         bound = min(bound, limits.max_reverse_speed / v)
     if limits.max_yaw_rate_deg is not None and omega != 0:
         bound = min(bound, math.radians(limits.max_yaw_rate_deg) / abs(omega))
+    if vehicle.load is not None:
+        cx, cy, _ = vehicle.load.center_of_gravity
+        gx, gy = vx - omega * (cy - ky), vy + omega * (cx - kx)
+        bound = min(bound, tipping_speed(vehicle, -omega * gy, omega * gx))
+        if limits.lateral_acceleration_at == "center_of_gravity":
+            v = math.hypot(gx, gy)
     if limits.max_lateral_acceleration is not None and v * omega != 0:
         bound = min(bound, math.sqrt(limits.max_lateral_acceleration / abs(v * omega)))
-    return Answer(bound, margin, stillness)
+    return Answer(bound, margin, stillness, spare)
+
+
+def tipping_speed(vehicle: Vehicle, ax: float, ay: float) -> float:
+    """Largest v_s with the zero-moment point among the contacts, by bisection.
+
+    (ax, ay) is the acceleration of the centre of gravity at v_s = 1.
+    """
+    assert vehicle.load is not None
+    px, py, height = vehicle.load.center_of_gravity
+    factor = vehicle.load.tipping_factor * height / 9.81
+    contacts = [(w.x - px, w.y - py) for w in vehicle.wheels]
+    reach = max(math.hypot(x, y) for x, y in contacts)
+    size = math.hypot(ax, ay) * factor
+    if size < 1e-12 * reach:
+        return math.inf
+    low, high = 0.0, 1.01 * reach / size
+    for _ in range(60):
+        middle = (low + high) / 2
+        point = (-ax * factor * middle, -ay * factor * middle)
+        low, high = (middle, high) if is_among(point, contacts) else (low, middle)
+    return math.sqrt(low)
+
+
+def is_among(
+    point: tuple[float, float], corners: Sequence[tuple[float, float]]
+) -> bool:
+    """Whether a point is in a triangle of the origin and two corners.
+
+    Where the origin is in the convex hull of the corners, these triangles fill it.
+    """
+    x, y = point
+    for ax, ay in corners:
+        for bx, by in corners:
+            area = ax * by - ay * bx
+            if area <= 1e-15:
+                continue
+            # point = s a + t b with s, t >= 0 and s + t <= 1
+            s, t = (x * by - y * bx) / area, (ax * y - ay * x) / area
+            if s >= -1e-12 and t >= -1e-12 and s + t <= 1:
+                return True
+    return False
+
+
+def angle_rates(
+    vehicle: Vehicle, wheel: SteerableWheel, kappa_n: float, beta: float, still: float
+) -> tuple[float, float]:
+    """Derivatives of α_i by κ_n and β, by differences of fourth order.
+
+    The formula of the branch that holds at κ_n is continued beyond its ends.
+    """
+    kg = kappa_g(vehicle)
+    kx, ky = reference(vehicle)
+    x, y = wheel.x - kx, wheel.y - ky
+
+    def alpha(k: float, b: float) -> float:
+        if abs(kappa_n) < 1:
+            v, omega = 1.0, kg * k
+        else:
+            v, omega = 2 - sgn(kappa_n) * k, kg * sgn(kappa_n)
+        return math.atan2(v * math.sin(b) + omega * x, v * math.cos(b) - omega * y)
+
+    h = 1e-3 * still / max(1.0, kg * math.hypot(x, y))
+
+    def slope(at: Callable[[float], float]) -> float:
+        total = 0.0
+        for step, weight in ((1, 8), (2, -1)):
+            apart = math.remainder(at(step * h) - at(-step * h), 2 * math.pi)
+            total += weight * apart
+        return total / (12 * h)
+
+    return (
+        slope(lambda d: alpha(kappa_n + d, beta)),
+        slope(lambda d: alpha(kappa_n, beta + d)),
+    )
+
+
+def rolling_speeds(
+    wheel: SteerableWheel | FixedWheel | MecanumWheel | OmniWheel,
+    ux: float,
+    uy: float,
+    omega: float,
+) -> list[float]:
+    """Rolling speeds of all wheels on one mount, at resting steering.
+
+    Wheels beside a steering axis move with it and with the vehicle's rotation.
+    """
+    match wheel:
+        case SteeredWheel():
+            arms = [wheel.offset]
+        case Turntable():
+            arms = [wheel.track / 2, -wheel.track / 2]
+        case _:
+            return [rolling(wheel, ux, uy)]
+    alpha = math.atan2(uy, ux)
+    speeds = []
+    for arm in arms:
+        ax, ay = -arm * math.sin(alpha), arm * math.cos(alpha)
+        wx, wy = ux - omega * ay, uy + omega * ax
+        speeds.append(wx * math.cos(alpha) + wy * math.sin(alpha))
+    return speeds
 
 
 def rolling(
-    wheel: SteeredWheel | FixedWheel | MecanumWheel | OmniWheel, ux: float, uy: float
+    wheel: SteerableWheel | FixedWheel | MecanumWheel | OmniWheel, ux: float, uy: float
 ) -> float:
-    """Rolling speed of a wheel whose contact point moves with (ux, uy)."""
+    """Rolling speed of a wheel whose contact point or axis moves with (ux, uy)."""
     match wheel:
-        case SteeredWheel():
+        case SteerableWheel():
             return math.hypot(ux, uy)
         case FixedWheel() | OmniWheel():
             delta = math.radians(wheel.heading_deg)
@@ -249,7 +385,7 @@ def rolling(
             return along / math.cos(gamma)
 
 
-def room(wheel: SteeredWheel, alpha: float) -> float:
+def room(wheel: SteerableWheel, alpha: float) -> float:
     """How far α is inside the steering range (negative: outside), rad."""
     assert wheel.steering_range_deg is not None
     least, largest = map(math.radians, wheel.steering_range_deg)
@@ -264,27 +400,47 @@ def room(wheel: SteeredWheel, alpha: float) -> float:
 
 # --- plain twins of configspace.kernels
 
+DISC, STRIP, OFFSET, LATERAL, EDGE = range(5)
+
+
+def row_load(row: Sequence[Any], c: float, s: float, beta: float) -> float:
+    """Squared load of one row (kind, p, b, n, d) of the load table."""
+    kind, p, b, n, d = int(row[0]), *row[1:5]
+    scale = p if kind in (DISC, STRIP, OFFSET) else 1.0
+    x = c * scale * math.cos(beta) + s * b.real
+    y = c * scale * math.sin(beta) + s * b.imag
+    along = x * n.real + y * n.imag
+    match kind:
+        case 0:
+            return float(x * x + y * y)
+        case 1:
+            return float(along**2)
+        case 2:
+            return float((math.hypot(x, y) - s * d) ** 2)
+        case 3:
+            return float(p * abs(s) * math.hypot(x, y))
+        case _:
+            return float(max(0.0, p * s * along))
+
+
+def split(kappa_n: float) -> tuple[float, float]:
+    """(c, s): the shares of translation and rotation."""
+    if abs(kappa_n) < 1:
+        return 1.0, kappa_n
+    return 2 - abs(kappa_n), sgn(kappa_n)
+
 
 def node_loads(
-    c: FloatArray,
-    s: FloatArray,
-    e: npt.NDArray[np.complex128],
-    table: Sequence[npt.NDArray[Any]],
-    pad: FloatArray,
+    kappa: FloatArray, beta: FloatArray, table: Sequence[npt.NDArray[Any]]
 ) -> FloatArray:
-    """Largest squared load at every node: disc 0, strip 1, product 2."""
-    kind, p, b, n = table
-    out = np.zeros((c.size, e.size))
-    for row in range(kind.size):
-        z = c[:, None] * p[row] * e[None, :] + s[:, None] * b[row]
-        if kind[row] == 0:
-            load = np.abs(z) ** 2
-        elif kind[row] == 1:
-            load = (z * np.conj(n[row])).real ** 2
-        else:
-            load = np.broadcast_to((p[row] ** 2 * c * np.abs(s))[:, None], out.shape)
-        out = np.maximum(out, load)
-    return out + pad[:, None]
+    """Largest squared load at every node, one after the other."""
+    rows = list(zip(*table[:5], strict=True))
+    return np.array(
+        [
+            [max(row_load(row, *split(k), b) for row in rows) for b in beta.tolist()]
+            for k in kappa.tolist()
+        ]
+    )
 
 
 def load_bounds(
@@ -297,24 +453,14 @@ def load_bounds(
     The extremes are taken over everything where one can stand: corners, the points of
     an edge where the derivative vanishes, and a mesh within.
     """
-    kind, p, b, n = int(row[0]), float(row[1]), complex(row[2]), complex(row[3])
-
-    def load(k: float, angle: float) -> float:
-        c, s = min(1.0, 2 - abs(k)), max(-1.0, min(1.0, k))
-        z = c * p * cmath.exp(1j * angle) + s * b
-        if kind == 0:
-            return abs(z) ** 2
-        if kind == 1:
-            return float((z * n.conjugate()).real ** 2)
-        return p * p * c * abs(s)
-
     angles = [beta[0], beta[1]]
+    b, n = complex(row[2]), complex(row[3])
     for zero in (cmath.phase(b) if b else 0.0, cmath.phase(n)):
         for turn in range(-8, 9):
             angle = zero + turn * math.pi / 2
             if beta[0] < angle < beta[1]:
                 angles.append(angle)
-    angles.extend(np.linspace(*beta, 25))
-    curvatures = [kappa[0], kappa[1], *np.linspace(*kappa, 25)]
-    values = [load(k, a) for k in curvatures for a in angles]
+    angles.extend(np.linspace(*beta, 25).tolist())
+    curvatures = [kappa[0], kappa[1], *np.linspace(*kappa, 25).tolist()]
+    values = [row_load(row, *split(k), a) for k in curvatures for a in angles]
     return min(values), max(values)
