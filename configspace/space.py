@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,12 +14,13 @@ import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.exact import LINE_TOLERANCE, exact_reason, exact_v_max
-from configspace.grid import Grid
+from configspace.grid import Grid, edges_of
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.limits import Reason
 from configspace.omni_curve import finite, nominal_curvature, together
 from configspace.rate_cells import CellRates, cell_rate_limits
 from configspace.rates import rate_limits
+from configspace.undercarriage import Mobility
 from configspace.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -245,7 +247,8 @@ class PermissibleSpace:
         Returns
         -------
         reason : (...,) uint16
-            Flags of `Reason`: exact where the vehicle is known, else those of the cell.
+            Flags of `Reason`: exact where the vehicle is known, else those of the cell;
+            `Reason.UNREACHABLE` is added to what binds in another component.
         """
         return self.explain(kappa_n, beta, reverse=reverse)[0]
 
@@ -324,17 +327,49 @@ class PermissibleSpace:
         wheel : (...,) int16
         """
         kappa_n, beta = self._checked(kappa_n, beta)
-        if self.vehicle is not None:
-            return exact_reason(self.vehicle, kappa_n, beta, reverse=reverse)
         row, column, _, _, on_line = self._locate(kappa_n, beta)
+        apart = (self._reach[row, column] == BLOCKED) & on_line
+        apart &= self.tables.state[row, column] == FREE
+        extra = np.where(apart, np.uint16(Reason.UNREACHABLE), np.uint16(0))
+        if self.vehicle is not None:
+            why, who = exact_reason(self.vehicle, kappa_n, beta, reverse=reverse)
+            return why | extra, who
         direction = self._direction(reverse)
-        why = self.tables.reason[direction, row, column]
+        why = self.tables.reason[direction, row, column] | extra
         who = self.tables.wheel[direction, row, column]
         off = Reason.PARALLEL_WHEELS if self.is_translating else Reason.FIXED_WHEEL
         return (
             np.where(on_line, why, np.uint16(off)),
             np.where(on_line, who, np.int16(-1)),
         )
+
+    def is_reachable(self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike) -> BoolArray:
+        """Return where configurations are permitted and connected with straight ahead.
+
+        Proved by free cells, so an answer may be False next to a blocked area. Where
+        straight ahead is blocked itself, the largest component is meant.
+
+        Parameters
+        ----------
+        kappa_n : (...,) float, 1, [-2, 2]
+        beta : (...,) float, rad
+        """
+        kappa_n, beta = self._checked(kappa_n, beta)
+        row, column, _, _, on_line = self._locate(kappa_n, beta)
+        return np.asarray((self._reach[row, column] == FREE) & on_line)
+
+    @cached_property
+    def _reach(self) -> npt.NDArray[np.uint8]:
+        """Codes of `configspace.topology.reachable` per cell."""
+        from configspace.topology import reachable
+
+        line = self.line_beta
+        mobility = Mobility(complex(*self.header.reference), line, self.is_translating)
+        edges = edges_of(mobility, self.grid)
+        code = reachable(self.tables.state, *edges, (0.0, line or 0.0))
+        if (code == BLOCKED).all():  # straight ahead is blocked
+            code = reachable(self.tables.state, *edges, None)
+        return code
 
     def box(
         self,
