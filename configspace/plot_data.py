@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import cmath
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import ConvexHull
 
 from configspace.errors import InvalidInput, Problem
 from configspace.kernels import MIXED
 from configspace.space import PermissibleSpace
+from configspace.vehicle import SteerableWheel, Vehicle, Wheel
 
 __all__ = [
     "blocked_ranges",
@@ -18,6 +22,9 @@ __all__ = [
     "curve_values",
     "require_curve",
     "require_plane",
+    "steering_span",
+    "support_polygon",
+    "wheel_bodies",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -51,11 +58,11 @@ def cell_values(
     kappa_n = _middles(np.linspace(-2, 2, space.grid.n_kappa * per_row + 1))
     beta = _middles(np.linspace(-np.pi, np.pi, space.grid.n_beta * per_column + 1))
     v_max = space.v_max(kappa_n[:, np.newaxis], beta, reverse=reverse)
-    row, i = _cells_and_parts(kappa_n.size, per_row)
-    column, j = _cells_and_parts(beta.size, per_column)
-    at = np.ix_(row, column)
-    free = space.tables.parts[at] >> (4 * i[:, np.newaxis] + j) & 1 == 1
-    mixed = (space.tables.state[at] == MIXED) & ~free
+    state = np.repeat(space.tables.state, per_row, axis=0)
+    state = np.repeat(state, per_column, axis=1)
+    sheet = replace(space, vehicle=None)
+    by_sheet = sheet.v_max(kappa_n[:, np.newaxis], beta, reverse=reverse)
+    mixed = (state == MIXED) & (by_sheet == 0)
     return kappa_n, beta, np.where(v_max > 0, v_max, np.nan), mixed
 
 
@@ -164,6 +171,53 @@ def require_curve(space: PermissibleSpace) -> None:
         )
 
 
+def steering_span(wheel: SteerableWheel) -> tuple[float, float]:
+    """Return the middle of a steering range and half of it, rad.
+
+    The middle is 0 where the wheel turns freely; half is π at most.
+    """
+    least, largest = wheel.steering_range
+    if math.isinf(largest):
+        return 0.0, math.pi
+    return (least + largest) / 2, min((largest - least) / 2, math.pi)
+
+
+def wheel_bodies(wheel: Wheel) -> tuple[tuple[complex, float], ...]:
+    """Return place and rolling direction of everything that rolls in a wheel unit.
+
+    Steering angles are 0, or in the middle of the range where 0 is not in it. A wheel
+    beside its steering axis stands there, a turntable has two.
+
+    Returns
+    -------
+    bodies : tuple of (complex, float), m, rad
+        In the vehicle file's frame.
+    """
+    if not isinstance(wheel, SteerableWheel):
+        return ((wheel.position, getattr(wheel, "heading", 0.0)),)
+    middle, half = steering_span(wheel)
+    alpha = 0.0 if abs(math.remainder(middle, 2 * math.pi)) <= half else middle
+    aside = 1j * cmath.exp(1j * alpha)
+    return tuple((wheel.position + aside * d, alpha) for d in wheel.offsets)
+
+
+def support_polygon(vehicle: Vehicle) -> FloatArray:
+    """Return the corners of the polygon that a vehicle stands on.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Whose wheels do not stand on one line, as where a load is given.
+
+    Returns
+    -------
+    corners : (n, 2) float, m
+        Counter-clockwise, in the vehicle file's frame.
+    """
+    points = np.array([(wheel.x, wheel.y) for wheel in vehicle.wheels])
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
 def _free_axis(space: PermissibleSpace) -> int:
     return 1 if space.is_translating else 0
 
@@ -179,15 +233,6 @@ def _curve_nodes(space: PermissibleSpace, reverse: bool) -> FloatArray:
         kappa_n = np.zeros_like(beta)
     v_max = space.v_max(kappa_n, beta, reverse=reverse)
     return np.stack([kappa_n, beta, v_max], axis=-1)
-
-
-def _cells_and_parts(
-    size: int, per_cell: int
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the cell of each point and which quarter of it."""
-    index = np.arange(size)
-    part = 4 * (2 * (index % per_cell) + 1) // (2 * per_cell)
-    return index // per_cell, part
 
 
 def _middles(edges: FloatArray) -> FloatArray:

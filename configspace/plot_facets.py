@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -12,7 +11,7 @@ import numpy.typing as npt
 from configspace.errors import InvalidInput, Problem
 from configspace.kinematics import wheel_states
 from configspace.omni_curve import components
-from configspace.plot_data import crossings, require_plane
+from configspace.plot_data import crossings, require_plane, steering_span
 from configspace.rotation_centre import singular_points
 from configspace.space import PermissibleSpace
 from configspace.vehicle import Castor, SteerableWheel, SteeredWheel, Vehicle
@@ -90,8 +89,7 @@ def steering_polygons(
     steered = vehicle.wheels[index]
     if not isinstance(steered, SteerableWheel):
         raise InvalidInput(Problem("wheel", f"{steered.id}: {steered.type}", "steers"))
-    least, largest = steered.steering_range
-    middle = (least + largest) / 2 if math.isfinite(largest) else 0.0
+    middle, _ = steering_span(steered)
     kappa_n, beta = _nodes_near_jumps(vehicle, index)
     permitted, blocked = _cut_net(space, kappa_n, beta)
     alpha = _over(

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 
 import configspace
 from configspace import Grid, PermissibleSpace
+from configspace.grid import edges_of
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.testing import (
-    VEHICLE_KINDS,
+    ALL_KINDS,
     VehicleKind,
     assert_sound,
     configurations,
@@ -40,7 +41,7 @@ def random_grid(rng: np.random.Generator) -> Grid:
 def sweep(seed: int, n_vehicles: int, per_vehicle: int) -> None:
     rng = np.random.default_rng(seed)
     for i in range(n_vehicles):
-        vehicle = random_vehicle(rng, VEHICLE_KINDS[i % len(VEHICLE_KINDS)])
+        vehicle = random_vehicle(rng, ALL_KINDS[i % len(ALL_KINDS)])
         space = build(vehicle, random_grid(rng))
         kappa_n, beta = random_configurations(rng, vehicle, per_vehicle)
         assert_sound(space, vehicle, kappa_n, beta)
@@ -67,7 +68,7 @@ def test_ten_million_configurations_are_sound() -> None:
     sweep(1000, 1000, 10_000)
 
 
-@given(vehicles(), configurations(), grids())
+@given(vehicles(ALL_KINDS), configurations(), grids())
 @settings(max_examples=150, deadline=None)
 def test_any_configuration_is_sound(
     vehicle: Vehicle, configuration: tuple[float, float], grid: Grid
@@ -77,26 +78,29 @@ def test_any_configuration_is_sound(
     assert_sound(sheet_of(space), vehicle, *configuration)
 
 
-@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_sound_by_the_loop_over_wheels_too(kind: VehicleKind) -> None:
     rng = np.random.default_rng(7)
     for _ in range(15):
         vehicle = random_vehicle(rng, kind)
         space = build(vehicle, random_grid(rng))
-        kappa_n, beta = random_configurations(rng, vehicle, 100)
+        kappa_n, beta = random_configurations(rng, vehicle, 60)
         for reverse in (False, True):
             known = space.v_max(kappa_n, beta, reverse=reverse)
             alone = sheet_of(space).v_max(kappa_n, beta, reverse=reverse)
             for j in range(kappa_n.size):
                 truth = naive.exact(vehicle, kappa_n[j], beta[j], reverse=reverse)
                 bound = truth.v_max * (1 + 1e-9)
+                # The rates are found by differences, which are not as exact.
+                if truth.spare < -1e-6 / max(truth.stillness, 1e-9) ** 2:
+                    bound = 0.0
                 if truth.margin < -1e-9 / max(truth.stillness, 1e-9):
                     bound = 0.0
                 assert alone[j] <= bound
                 assert known[j] <= bound
 
 
-@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_answers_are_not_vacuous(kind: VehicleKind) -> None:
     rng = np.random.default_rng(8)
     speed: list[float] = []
@@ -107,8 +111,10 @@ def test_answers_are_not_vacuous(kind: VehicleKind) -> None:
         kappa_n, beta = rng.uniform(-2, 2, 4000), rng.uniform(-np.pi, np.pi, 4000)
         if vehicle.mobility.line_beta is not None:
             beta = np.full_like(beta, vehicle.mobility.line_beta)
+        if vehicle.mobility.is_translating:
+            kappa_n = np.zeros_like(kappa_n)
         truth = rigid_body(vehicle, kappa_n, beta)
-        open_ = truth.is_clear() & (truth.margin > 0)
+        open_ = truth.is_clear() & (truth.permitted > 0)
         v_max = truth.v_max[open_]
         known = space.v_max(kappa_n, beta)[open_]
         assert (known > 0).all()
@@ -121,7 +127,37 @@ def test_answers_are_not_vacuous(kind: VehicleKind) -> None:
     assert lost < 0.03 * seen
 
 
-@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def inside(
+    rng: np.random.Generator,
+    space: PermissibleSpace,
+    vehicle: Vehicle,
+    row: np.ndarray,
+    column: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points of cells, (cell, point): corners, edges, centre and random ones.
+
+    `row` and `column` may be fractions: the last axis is then the extent, in cells.
+    """
+    place = rng.random((2, row.shape[0], 24))
+    place[:, :, :4] = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, None, :]
+    place[0, :, 4:8] = [0, 1, 0, 1]
+    place[1, :, 8:12] = [0, 1, 0, 1]
+    place[:, :, 12] = 0.5
+    found = []
+    for edges, at, share in zip(
+        edges_of(vehicle.mobility, space.grid), (row, column), place, strict=True
+    ):
+        least, largest = at[:, :1], at[:, 1:]
+        where = least + share * (largest - least)
+        found.append(np.interp(where, np.arange(edges.size), edges))
+    return found[0], found[1]
+
+
+def whole(index: np.ndarray) -> np.ndarray:
+    return np.stack([index, index + 1], axis=-1).astype(float)
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_cells_bound_what_is_inside_them(kind: VehicleKind) -> None:
     rng = np.random.default_rng(9)
     for _ in range(12):
@@ -132,39 +168,63 @@ def test_cells_bound_what_is_inside_them(kind: VehicleKind) -> None:
         tables = space.tables
         rows, columns = tables.state.shape
         row, column = rng.integers(0, rows, 300), rng.integers(0, columns, 300)
-        # Corners, edges, centre, random points; (cell, point).
-        place = rng.random((2, 300, 24))
-        place[:, :, :4] = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, None, :]
-        place[0, :, 4:8] = [0, 1, 0, 1]
-        place[1, :, 8:12] = [0, 1, 0, 1]
-        place[:, :, 12] = 0.5
-        k = space.grid.kappa_edges
-        kappa_n = k[row][:, None] + place[0] * (k[row + 1] - k[row])[:, None]
-        if space.line_beta is None:
-            b = space.grid.beta_edges
-            beta = b[column][:, None] + place[1] * (b[column + 1] - b[column])[:, None]
-        else:
-            beta = np.full_like(kappa_n, space.line_beta)
+        kappa_n, beta = inside(rng, space, vehicle, whole(row), whole(column))
         for reverse in (False, True):
             d = 1 if reverse and len(tables.load) > 1 else 0
             truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
             low = tables.v_lo[d, row, column][:, None]
             high = tables.v_hi[d, row, column][:, None]
             state = tables.state[row, column][:, None]
-            slack = 4e-15 / np.maximum(truth.stillness, 1e-15) + 3e-14
-            permitted = (truth.margin >= -slack) & (truth.stillness > 1e-13)
-            clear = (truth.margin > slack) & (truth.stillness > 1e-9)
-            assert permitted[np.broadcast_to(state == FREE, permitted.shape)].all()
-            assert not clear[np.broadcast_to(state == BLOCKED, clear.shape)].any()
-            free = np.broadcast_to(state == FREE, permitted.shape)
+            free = np.broadcast_to(state == FREE, kappa_n.shape)
+            blocked = np.broadcast_to(state == BLOCKED, kappa_n.shape)
+            assert not truth.is_blocked[free].any()
+            assert not truth.is_open[blocked].any()
             assert (low <= truth.v_max * (1 + 1e-12))[free].all()
             assert ((low > 0) == (state == FREE)).all()
-            unblocked = np.broadcast_to(state != BLOCKED, permitted.shape)
-            regular = unblocked & (truth.v_max < 1e6)
+            regular = ~blocked & (truth.v_max < 1e6)
             assert (high >= truth.v_max * (1 - 1e-12))[regular].all()
             # Tight, too: the bounds are reached somewhere in the cell.
             reached = truth.v_max.min(axis=1)[state[:, 0] == FREE]
             assert (low[:, 0][state[:, 0] == FREE] >= 0.4 * reached).all()
+
+
+STEERABLE: tuple[VehicleKind, ...] = (
+    "steered",
+    "mixed",
+    "ackermann",
+    "offset",
+    "turntable",
+    "loaded",
+    "guaranteed",
+    "synchro",
+)
+
+
+@pytest.mark.parametrize("kind", STEERABLE)
+def test_free_parts_of_mixed_cells_are_permitted_all_over(kind: VehicleKind) -> None:
+    rng = np.random.default_rng(19)
+    seen = 0
+    for _ in range(25):
+        vehicle = random_vehicle(rng, kind)
+        space = build(vehicle, random_grid(rng))
+        cells = np.argwhere((space.tables.state == MIXED) & (space.tables.parts != 0))
+        cells = rng.permutation(cells)[:100]
+        if not len(cells):
+            continue
+        at = 4 * np.repeat(cells, 16, axis=0)
+        bit = np.tile(np.arange(16), len(cells))
+        at = at + np.stack([bit // 4, bit % 4], axis=-1)
+        parts = space.tables.parts[cells[:, 0], cells[:, 1]].astype(int)
+        free = (np.repeat(parts, 16) >> bit) & 1 == 1
+        corners = np.stack([at[free], at[free] + 1], axis=-1) / 4
+        kappa_n, beta = inside(rng, space, vehicle, corners[:, 0], corners[:, 1])
+        assert not rigid_body(vehicle, kappa_n, beta).is_blocked.any()
+        assert_sound(replace(space, vehicle=None), vehicle, kappa_n, beta)
+        # The sheet uses them.
+        middle = kappa_n[:, 12], beta[:, 12]
+        assert (replace(space, vehicle=None).v_max(*middle) > 0).all()
+        seen += int(free.sum())
+    assert seen > (20 if kind in {"ackermann", "synchro"} else 1000)
 
 
 def random_boxes(
@@ -189,7 +249,7 @@ def random_boxes(
     )
 
 
-@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_free_boxes_are_permitted_all_over(kind: VehicleKind) -> None:
     rng = np.random.default_rng(10)
     seen = np.zeros(3, int)
@@ -205,9 +265,7 @@ def test_free_boxes_are_permitted_all_over(kind: VehicleKind) -> None:
             beta = np.full_like(beta, space.line_beta)
         for reverse in (False, True):
             truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
-            slack = 4e-15 / np.maximum(truth.stillness, 1e-15) + 3e-14
-            blocked = (truth.margin < -slack) | (truth.stillness < 1e-13)
-            clear = (truth.margin > slack) & (truth.stillness > 1e-9)
+            blocked, clear = truth.is_blocked, truth.is_open
             for one in (space, replace(space, vehicle=None)):
                 state, v_low = one.box(k0, k1, b0, b1, reverse=reverse)
                 assert set(np.unique(state)) <= {FREE, BLOCKED, MIXED}
@@ -216,7 +274,7 @@ def test_free_boxes_are_permitted_all_over(kind: VehicleKind) -> None:
                 slowest = truth.v_max.min(axis=1)
                 assert (v_low <= slowest * (1 + 1e-12))[state == FREE].all()
             seen += np.bincount(state, minlength=3)
-    assert seen[FREE] > 0.1 * seen.sum()
+    assert seen[FREE] > (0.03 if kind == "guaranteed" else 0.1) * seen.sum()
 
 
 def test_tiny_boxes_are_as_fast_as_points() -> None:
@@ -240,15 +298,19 @@ def mirrored(vehicle: Vehicle) -> Vehicle:
         for key in ("heading_deg", "roller_deg"):
             if key in wheel:
                 wheel[key] = -wheel[key]
+        if "offset" in wheel:
+            wheel["offset"] = -wheel["offset"]
         if wheel.get("steering_range_deg"):
             least, largest = wheel["steering_range_deg"]
             wheel["steering_range_deg"] = [-largest, -least]
     if data["reference_point"]:
         data["reference_point"][1] *= -1
+    if data["load"]:
+        data["load"]["center_of_gravity"][1] *= -1
     return configspace.vehicle_from_data(data)
 
 
-@given(vehicles())
+@given(vehicles(ALL_KINDS))
 @settings(max_examples=60, deadline=None)
 def test_a_mirrored_vehicle_has_the_mirrored_space(vehicle: Vehicle) -> None:
     rng = np.random.default_rng(12)
@@ -263,7 +325,7 @@ def test_a_mirrored_vehicle_has_the_mirrored_space(vehicle: Vehicle) -> None:
     np.testing.assert_allclose(left.v_lo, right.v_lo[:, ::-1, ::-1], rtol=1e-5)
 
 
-@given(vehicles())
+@given(vehicles(ALL_KINDS))
 @settings(max_examples=60, deadline=None)
 def test_tighter_limits_never_permit_more(vehicle: Vehicle) -> None:
     rng = np.random.default_rng(13)
@@ -280,9 +342,15 @@ def test_tighter_limits_never_permit_more(vehicle: Vehicle) -> None:
                     least + narrower[0],
                     largest - narrower[1],
                 ]
+        if wheel.get("max_steering_rate_deg") and rng.random() < 0.5:
+            wheel["max_steering_rate_deg"] *= rng.uniform(0.3, 1)
     for key, value in data["limits"].items():
-        if value is not None and rng.random() < 0.5:
+        if isinstance(value, float) and rng.random() < 0.5:
             data["limits"][key] = value * rng.uniform(0.2, 1)
+    if data["load"]:
+        data["load"]["tipping_factor"] *= rng.uniform(1, 2)
+    for key, value in (data["guaranteed"] or {}).items():
+        data["guaranteed"][key] = value * rng.uniform(1, 2)
     tighter = configspace.vehicle_from_data(data)
     kappa_n, beta = random_configurations(rng, vehicle, 200)
     clear = rigid_body(vehicle, kappa_n, beta).is_clear(1e-7)
@@ -299,7 +367,7 @@ def test_tighter_limits_never_permit_more(vehicle: Vehicle) -> None:
     assert (narrow.v_lo[0] <= wide.v_hi[0] * np.float32(1 + 1e-6)).all()
 
 
-@given(vehicles())
+@given(vehicles(ALL_KINDS))
 @settings(max_examples=60, deadline=None)
 def test_speeds_scale_with_the_limits(vehicle: Vehicle) -> None:
     rng = np.random.default_rng(14)
@@ -310,9 +378,11 @@ def test_speeds_scale_with_the_limits(vehicle: Vehicle) -> None:
         if wheel.get("max_speed"):
             wheel["max_speed"] *= factor
     for key, value in data["limits"].items():
-        if value is not None:
+        if isinstance(value, float):
             power = 2 if key == "max_lateral_acceleration" else 1
             data["limits"][key] = value * factor**power
+    if data["load"]:  # what keeps the vehicle upright grows with 1 / height
+        data["load"]["center_of_gravity"][2] /= factor**2
     faster = configspace.vehicle_from_data(data)
     kappa_n, beta = random_configurations(rng, vehicle, 300)
     np.testing.assert_allclose(
@@ -322,35 +392,42 @@ def test_speeds_scale_with_the_limits(vehicle: Vehicle) -> None:
     )
 
 
-@given(vehicles())
+@given(vehicles(ALL_KINDS))
 @settings(max_examples=60, deadline=None)
-def test_a_larger_vehicle_has_the_same_space(vehicle: Vehicle) -> None:
-    # κ_n is relative to the vehicle: lengths and limits grow alike.
+def test_a_smaller_vehicle_has_the_same_space(vehicle: Vehicle) -> None:
+    # κ_n is relative to the vehicle: lengths and limits shrink alike.
     rng = np.random.default_rng(15)
-    factor = 1.5
+    factor = 0.7
     data = vehicle.model_dump(mode="json")
     data["kappa_g"] = vehicle.boundary_curvature / factor
     for wheel in data["wheels"]:
-        wheel["x"] *= factor
-        wheel["y"] *= factor
+        for key in ("x", "y", "offset", "track", "steering_coupling"):
+            if key in wheel:
+                wheel[key] *= factor
     if data["reference_point"]:
         data["reference_point"] = [factor * x for x in data["reference_point"]]
+    if data["skid_steer"]:
+        data["skid_steer"]["effective_track"] *= factor
+    if data["load"]:
+        x, y, z = data["load"]["center_of_gravity"]
+        # Accelerations are v²/r, tipping ones of the width over the height.
+        data["load"]["center_of_gravity"] = [factor * x, factor * y, factor**2 * z]
     limits = data["limits"]
     if limits["max_yaw_rate_deg"]:
         limits["max_yaw_rate_deg"] /= factor
     if limits["max_lateral_acceleration"]:
         limits["max_lateral_acceleration"] /= factor
-    larger = configspace.vehicle_from_data(data)
+    smaller = configspace.vehicle_from_data(data)
     kappa_n, beta = random_configurations(rng, vehicle, 200)
     clear = rigid_body(vehicle, kappa_n, beta).is_clear(1e-6)
     np.testing.assert_allclose(
-        configspace.exact_v_max(larger, kappa_n, beta)[clear],
+        configspace.exact_v_max(smaller, kappa_n, beta)[clear],
         configspace.exact_v_max(vehicle, kappa_n, beta)[clear],
         rtol=1e-6,
     )
 
 
-@given(vehicles(("steered", "mixed", "mecanum", "omni")), configurations())
+@given(vehicles(ALL_KINDS), configurations())
 @settings(max_examples=60, deadline=None)
 def test_a_finer_grid_answers_alike_when_the_vehicle_is_known(
     vehicle: Vehicle, configuration: tuple[float, float]

@@ -1,0 +1,80 @@
+"""What all pictures of a permissible space share: labels, colours, legends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.figure import Figure, SubFigure
+
+from configspace.space import PermissibleSpace
+
+__all__ = [
+    "BETA",
+    "BETA_TICKS",
+    "KAPPA",
+    "KAPPA_TICKS",
+    "SPEEDS",
+    "V_MAX",
+    "legend_below",
+    "new_figure",
+    "side_by_side",
+    "speed_scale",
+    "title",
+]
+
+KAPPA = r"$\kappa_n$ [1]"
+BETA = r"$\beta$ [°]"
+V_MAX = r"$v_{\max}$ [m/s]"
+KAPPA_TICKS = (-2, -1, 0, 1, 2)
+BETA_TICKS = (-180, -90, 0, 90, 180)
+
+# The dark end is cut off: in greyscale no speed may look like the black of "blocked".
+SPEEDS: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.3, 1.0, 256)))
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size in inches that needs no pyplot."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def side_by_side(figure: Figure, widths: tuple[float, ...]) -> list[SubFigure]:
+    """Return parts of a figure, from left to right."""
+    return list(
+        figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]
+    )
+
+
+def title(space: PermissibleSpace, what: str = "", *, reverse: bool = False) -> str:
+    """Return the title of a picture; it says forwards or backwards where they differ."""
+    name = space.name.replace("$", r"\$")  # not a formula
+    way = ""
+    is_plane = space.line_beta is None and not space.is_translating
+    if is_plane and not what and len(space.tables.load) > 1:
+        way = ", backwards" if reverse else ", forwards"
+    what = f": {what}" if what else ""
+    return rf"{name}{what}{way},  $\kappa_g$ = {space.kappa_g:.3g} m$^{{-1}}$"
+
+
+def speed_scale(low: float, high: float) -> Normalize:
+    """Return a scale of some width, also for a space of one speed only."""
+    return Normalize(min(low, high / 2), high)
+
+
+def legend_below(axes: Axes, handles: Sequence[Artist], columns: int = 3) -> None:
+    """Add a legend below everything else, if there is anything to tell."""
+    if handles:
+        axes.figure.legend(
+            handles=handles,
+            loc="outside lower center",
+            ncols=columns,
+            fontsize="small",
+            frameon=False,
+        )
