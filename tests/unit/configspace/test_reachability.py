@@ -24,7 +24,7 @@ def test_all_of_the_paper_vehicle_hangs_together() -> None:
 
 @pytest.mark.parametrize("by_sheet", [False, True])
 def test_another_component_is_permitted_but_kept_apart(by_sheet: bool) -> None:
-    # A square that guarantees 1.3/s of nominal curvature with wheels that steer at
+    # A square that guarantees 1.1/s of nominal curvature with wheels that steer at
     # 1 rad/s: at |κ_n| = 1 some wheel is too near the centre of rotation for every β.
     wheels = [
         {
@@ -41,18 +41,18 @@ def test_another_component_is_permitted_but_kept_apart(by_sheet: bool) -> None:
     description = {
         "name": "square",
         "wheels": wheels,
-        "guaranteed": {"kappa_rate": 1.3},
+        "guaranteed": {"kappa_rate": 1.1},
     }
     vehicle = configspace.vehicle_from_data(description)
     space = configspace.build_space(vehicle, GRID, cache=False)
     if by_sheet:
         space = configspace.parse_space(configspace.dump_space(space))
-    assert space.is_reachable(0.0, [-0.1, 0.0, 0.1]).all()
-    on_the_spot = space.reason([1.9, -1.9], 0.1)
-    assert (space.v_max([1.9, -1.9], 0.1) > 0).all()
+    assert space.is_reachable(0.0, [0.0, 0.05]).all()
+    on_the_spot = space.reason([1.95, -1.95], 0.05)
+    assert (space.v_max([1.95, -1.95], 0.05) > 0).all()
     assert ((on_the_spot & Reason.UNREACHABLE) > 0).all()
-    assert not space.is_reachable([1.9, -1.9], 0.1).any()
-    assert not space.reason(0.1, 0.1) & Reason.UNREACHABLE
+    assert not space.is_reachable([1.95, -1.95], 0.05).any()
+    assert not space.reason(0.01, 0.05) & Reason.UNREACHABLE
 
 
 def test_a_robot_whose_straight_ahead_is_blocked_has_its_largest_component() -> None:
