@@ -9,6 +9,7 @@ takes every vertex on its sides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,9 @@ from scipy.sparse import coo_array, csgraph
 
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.places import Blocks, border_on, is_permitted
-from configspace.space import PermissibleSpace
+
+if TYPE_CHECKING:
+    from configspace.space import PermissibleSpace
 
 __all__ = ["Area", "permitted_area"]
 

@@ -18,7 +18,8 @@ from configspace.grid import Grid, edges_of
 from configspace.limits import LoadRow, SectorRow, rows_of
 from configspace.omni_curve import components
 from configspace.rate_cells import build_cell_rates
-from configspace.space import PermissibleSpace, SheetHeader, Tables
+from configspace.sheet import SheetHeader, Tables
+from configspace.space import PermissibleSpace
 from configspace.vehicle import Vehicle
 
 __all__ = ["build_space"]

@@ -15,7 +15,8 @@ import platformdirs
 
 from configspace.errors import CacheError
 from configspace.grid import Grid
-from configspace.space import PermissibleSpace, fingerprint
+from configspace.sheet import fingerprint
+from configspace.space import PermissibleSpace
 from configspace.storage import load_space, save_space
 from configspace.vehicle import Vehicle
 

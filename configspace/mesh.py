@@ -16,6 +16,7 @@ import io
 import os
 import secrets
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +32,9 @@ from configspace.places import (
     kappa_beta,
     speeds,
 )
-from configspace.space import PermissibleSpace
+
+if TYPE_CHECKING:
+    from configspace.space import PermissibleSpace
 
 __all__ = ["export", "to_mesh", "to_ribbon"]
 

@@ -8,12 +8,13 @@ is too fast.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from configspace.space import PermissibleSpace
+if TYPE_CHECKING:
+    from configspace.space import PermissibleSpace
 
 __all__ = ["Blocks", "border_on", "is_permitted", "kappa_beta", "speeds"]
 

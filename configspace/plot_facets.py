@@ -18,6 +18,7 @@ from configspace.vehicle import Castor, SteerableWheel, SteeredWheel, Vehicle
 
 __all__ = [
     "Facets",
+    "blocked_polygons",
     "rolling_polygons",
     "steering_polygons",
     "surface_polygons",
@@ -56,6 +57,25 @@ def surface_polygons(
         Corners (κ_n, β, 0).
     """
     return _cut_net(space, _KAPPA_NODES, _BETA_NODES, reverse)
+
+
+def blocked_polygons(space: PermissibleSpace) -> Facets:
+    """Return the blocked area alone, more finely than `surface_polygons`.
+
+    Parameters
+    ----------
+    space : PermissibleSpace
+
+    Returns
+    -------
+    blocked : list of (p, 3) float
+        Corners (κ_n, β, 0) in 1, rad.
+    """
+    kappa_n, beta = np.linspace(-2, 2, 161), np.linspace(-np.pi, np.pi, 181)
+    if space.vehicle is not None and len(space.vehicle.wheels) <= 12:
+        for wheel in range(len(space.vehicle.wheels)):
+            kappa_n, beta = _nodes_near_jumps(space.vehicle, wheel, kappa_n, beta)
+    return _cut_net(space, kappa_n, beta)[1]
 
 
 def steering_polygons(
@@ -217,22 +237,25 @@ def _cut_net(
         ],
         axis=2,
     ).reshape(-1, 8, 3)
-    permitted, blocked = [], []
+    n_free = (rings[:, ::2, 2] > 0).sum(axis=1)
+    permitted = list(rings[n_free == 4][:, ::2])
+    blocked = list(rings[n_free == 0][:, ::2])
     is_crossing = np.arange(8) % 2 == 1
-    for ring in rings:
-        free = ring[:, 2] > 0
-        if free.any():
-            permitted.append(ring[free])
-        if not free[::2].all():
-            # A crossing belongs to both, a corner to one.
-            ground = ring[~np.isnan(ring[:, 2]) & (~free | is_crossing)]
-            blocked.append(ground * (1.0, 1.0, 0.0))
+    for ring in rings[(n_free > 0) & (n_free < 4)]:
+        permitted.append(ring[ring[:, 2] > 0])
+        # A crossing belongs to both, a corner to one.
+        ground = ring[~np.isnan(ring[:, 2]) & (~(ring[:, 2] > 0) | is_crossing)]
+        blocked.append(ground * (1.0, 1.0, 0.0))
     return permitted, blocked
 
 
-def _nodes_near_jumps(vehicle: Vehicle, wheel: int) -> tuple[FloatArray, FloatArray]:
+def _nodes_near_jumps(
+    vehicle: Vehicle,
+    wheel: int,
+    kappa_n: FloatArray = _KAPPA_NODES,
+    beta: FloatArray = _BETA_NODES,
+) -> tuple[FloatArray, FloatArray]:
     """Return nodes that are dense around a wheel's singular points, never on them."""
-    kappa_n, beta = _KAPPA_NODES, _BETA_NODES
     for point in singular_points(vehicle):
         if point.wheel != wheel or point.beta is None:
             continue

@@ -55,7 +55,11 @@ def draw_sketch(axes: Axes, space: PermissibleSpace) -> None:
     axes.add_patch(Circle((k_x, k_y), circle, fc="none", ec="0.4", ls=":"))
     keys: list[Artist] = [
         Line2D(
-            [], [], color="0.4", ls=":", label=rf"$1/\kappa_g$ = {circle:.2g} m around K"
+            [],
+            [],
+            color="0.4",
+            ls=":",
+            label=rf"$1/\kappa_g$ = {circle:.2g} m around K",
         )
     ]
     if vehicle is not None:

@@ -20,6 +20,7 @@ __all__ = [
     "KAPPA",
     "KAPPA_TICKS",
     "SPEEDS",
+    "STEPS",
     "V_MAX",
     "legend_below",
     "new_figure",
@@ -36,6 +37,8 @@ BETA_TICKS = (-180, -90, 0, 90, 180)
 
 # The dark end is cut off: in greyscale no speed may look like the black of "blocked".
 SPEEDS: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.3, 1.0, 256)))
+STEPS = SPEEDS.resampled(20)
+"""The same in steps: bands in place of contours, and smaller files."""
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -52,15 +55,14 @@ def side_by_side(figure: Figure, widths: tuple[float, ...]) -> list[SubFigure]:
     )
 
 
-def title(space: PermissibleSpace, what: str = "", *, reverse: bool = False) -> str:
+def title(space: PermissibleSpace, *, reverse: bool = False) -> str:
     """Return the title of a picture; it says forwards or backwards where they differ."""
     name = space.name.replace("$", r"\$")  # not a formula
     way = ""
     is_plane = space.line_beta is None and not space.is_translating
-    if is_plane and not what and len(space.tables.load) > 1:
+    if is_plane and len(space.tables.load) > 1:
         way = ", backwards" if reverse else ", forwards"
-    what = f": {what}" if what else ""
-    return rf"{name}{what}{way},  $\kappa_g$ = {space.kappa_g:.3g} m$^{{-1}}$"
+    return rf"{name}{way},  $\kappa_g$ = {space.kappa_g:.3g} m$^{{-1}}$"
 
 
 def speed_scale(low: float, high: float) -> Normalize:

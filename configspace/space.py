@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,101 +18,17 @@ from configspace.limits import Reason
 from configspace.omni_curve import finite, nominal_curvature, together
 from configspace.rate_cells import CellRates, cell_rate_limits
 from configspace.rates import rate_limits
+from configspace.sheet import SheetHeader, Tables
 from configspace.undercarriage import Mobility
 from configspace.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["PermissibleSpace", "SheetHeader", "Tables"]
+__all__ = ["PermissibleSpace"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-
-FORMAT_VERSION = 2
-"""Version of the file format; raise it when the tensors or the header change."""
-ALGORITHM_VERSION = 2
-"""Version of the numbers; raise it when building gives other tables."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """The arrays of a data sheet, read-only.
-
-    d is 1, or 2 where driving backwards has limits of its own; a line-mobile vehicle
-    has m = 1 column of cells, one that cannot turn k = 1 row.
-    """
-
-    load: npt.NDArray[np.float32]
-    """(d, k + 1, m + 1) squared inverse speed at the nodes, (m/s)⁻²; interpolated
-    bilinearly it is never too small anywhere."""
-    v_lo: npt.NDArray[np.float32]
-    """(d, k, m) m/s; v_max is at least this all over the cell."""
-    v_hi: npt.NDArray[np.float32]
-    """(d, k, m) m/s; v_max is at most this all over the cell."""
-    state: npt.NDArray[np.uint8]
-    """(k, m) 0 free, 1 blocked, 2 mixed."""
-    parts: npt.NDArray[np.uint16]
-    """(k, m) which of the 4 × 4 parts of a mixed cell are free: bit 4 i + j for the
-    part i-th in κ_n and j-th in β; all bits of a free cell, none of a blocked one."""
-    reason: npt.NDArray[np.uint16]
-    """(d, k, m) flags of `Reason`."""
-    wheel: npt.NDArray[np.int16]
-    """(d, k, m) index of the wheel that blocks or binds, -1 for the vehicle."""
-
-    def __post_init__(self) -> None:
-        for array in vars(self).values():
-            array.flags.writeable = False
-
-
-@dataclass(frozen=True)
-class SheetHeader:
-    """What a data sheet says beside its tables."""
-
-    name: str
-    description: str
-    kappa_g: float
-    """Boundary curvature, 1/m."""
-    reference: tuple[float, float]
-    """K in the vehicle file's frame, m."""
-    line_beta: float | None
-    """The constant β of a line-mobile vehicle, rad."""
-    is_translating: bool
-    """Whether only κ_n = 0 is possible, as with a synchro drive."""
-    footprint: tuple[tuple[float, float], ...]
-    wheel_ids: tuple[str, ...]
-    grid: Grid
-    fingerprint: str
-    """Content hash of vehicle, grid, format and algorithm."""
-
-    @classmethod
-    def of(cls, vehicle: Vehicle, grid: Grid) -> SheetHeader:
-        """Return the header for a vehicle on a grid."""
-        k = vehicle.reference
-        return cls(
-            name=vehicle.name,
-            description=vehicle.description,
-            kappa_g=vehicle.boundary_curvature,
-            reference=(k.real, k.imag),
-            line_beta=vehicle.mobility.line_beta,
-            is_translating=vehicle.mobility.is_translating,
-            footprint=vehicle.footprint,
-            wheel_ids=tuple(wheel.id for wheel in vehicle.wheels),
-            grid=grid,
-            fingerprint=fingerprint(vehicle, grid),
-        )
-
-
-def fingerprint(vehicle: Vehicle, grid: Grid) -> str:
-    """Return the content hash that names a space in the cache."""
-    content: dict[str, Any] = {
-        "vehicle": vehicle.model_dump(mode="json"),
-        "grid": [grid.n_kappa, grid.n_beta],
-        "format": FORMAT_VERSION,
-        "algorithm": ALGORITHM_VERSION,
-    }
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,13 +20,13 @@ from configspace.grid import Grid
 from configspace.kernels import MIXED
 from configspace.omni_curve import boundary_curvature
 from configspace.rate_cells import SHARES, CellRates
-from configspace.space import (
+from configspace.sheet import (
     ALGORITHM_VERSION,
     FORMAT_VERSION,
-    PermissibleSpace,
     SheetHeader,
     Tables,
 )
+from configspace.space import PermissibleSpace
 
 __all__ = ["dump_space", "load_space", "parse_space", "save_space"]
 

@@ -14,6 +14,7 @@ same configuration, so a motion may go through that pole.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +25,10 @@ from configspace.angles import wrap
 from configspace.errors import InvalidInput, Problem
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.omni_curve import finite, nominal_curvature
-from configspace.space import PermissibleSpace
 from configspace.turns import winding
+
+if TYPE_CHECKING:
+    from configspace.space import PermissibleSpace
 
 __all__ = [
     "REACHABLE",

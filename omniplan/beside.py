@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -115,44 +116,64 @@ def zone_bounds(
     """
     body = Chord.of(part, reference)
     arm = abs(row.b)
-    ends, speeds = [], []
-    for v, omega, u in (
-        (body.a, part.omega0, chord.a),
-        (body.b, part.omega1, chord.b),
-    ):
-        v_s = np.maximum(np.maximum(np.abs(v), np.abs(omega) / kappa_g), 1e-300)
-        c = np.abs(v) / v_s
-        e = np.where(c > 0, v / np.maximum(np.abs(v), 1e-300), 1.0)
-        z = u / v_s
-        across = np.abs((e * np.conj(row.b)).imag)
-        asked = row.kappa_share * across
-        asked = asked + row.beta_share * np.abs((c * e * z.conj()).real)
-        ends.append((asked, np.abs(z) ** 2))
-        speeds.append(v_s)
-    slower = 0.5 * np.maximum(*speeds) + 0.5 * np.minimum(*speeds)
-    spread = part.dt**2 / 8 * (part.v_ddot + part.omega_ddot / kappa_g)
-    # How far c, s, e and with them z may be from those at the nearer end.
-    moved = np.abs(body.b - body.a) + np.abs(part.omega1 - part.omega0) / kappa_g
-    moved = (moved + 2 * spread) / np.maximum(np.minimum(*speeds), 1e-300)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sweep = np.where(
-            body.near > 0, (np.abs(body.b - body.a) + 2 * body.radius) / body.near, 2.0
+    ends = [
+        _asked(row, kappa_g, v, omega, u)
+        for v, omega, u in (
+            (body.a, part.omega0, chord.a),
+            (body.b, part.omega1, chord.b),
         )
-    sweep = np.minimum(sweep, math.pi)
+    ]
+    slowest = np.minimum(ends[0].v_s, ends[1].v_s)
+    fastest = np.maximum(ends[0].v_s, ends[1].v_s)
+    # How far (c e^{jβ}, s) may be from that at the ends: the chord itself turns it
+    # monotonously, from end to end; the rest is what the motion leaves the chord by.
+    spread = part.dt**2 / 8 * (part.v_ddot + part.omega_ddot / kappa_g)
+    spread = 2 * spread / np.maximum(slowest, 1e-300)
+    moved = 2 * np.abs(ends[1].share - ends[0].share)
+    moved = moved + 2 * np.abs(ends[1].s - ends[0].s) + spread
+    sweep = np.abs(np.angle(body.b * body.a.conj())) + body.spread()
+    sweep = np.where(body.near > 0, sweep, math.pi)
     slack = row.kappa_share * arm * sweep
     slack = slack + row.beta_share * 2 * (2 + arm) * moved
     # Whatever the direction: |Im(e b̄)| ≤ |b| and |c (c + s f)| ≤ c (c + |b|).
-    c_high = np.minimum(body.far / np.maximum(np.minimum(*speeds), 1e-300), 1.0)
-    most = row.kappa_share * arm + row.beta_share * c_high * (c_high + arm)
-    asked_high = np.minimum(np.maximum(ends[0][0], ends[1][0]) + slack, most)
-    fastest = np.maximum(*speeds) + spread
-    room = (chord.near / np.maximum(fastest, 1e-300)) ** 2
+    c = np.minimum(np.maximum(np.abs(ends[0].share), np.abs(ends[1].share)) + moved, 1)
+    most = row.kappa_share * arm + row.beta_share * c * (c + arm)
+    asked = np.maximum(ends[0].asked, ends[1].asked)
+    asked_high = np.minimum(asked + slack, most)
+    # |z|² = |U|² / v_s², at its least between the ends or by what may have moved.
+    nearest = np.minimum(ends[0].room, ends[1].room) - (1 + arm) * moved
+    room = np.maximum(nearest, chord.near / np.maximum(fastest * (1 + spread), 1e-300))
     with np.errstate(divide="ignore", invalid="ignore"):
         low = np.maximum(
-            *(
-                np.where((q > 0) & (v > 0), a / q, 0.0)
-                for (a, q), v in zip(ends, speeds, strict=True)
-            )
+            *(np.where(end.room > 0, end.asked / end.room**2, 0.0) for end in ends)
         )
-        high = np.where(room > 0, asked_high / room, np.inf)
-    return np.where(slower > 0, low, 0.0), high
+        high = np.where(room > 0, asked_high / room**2, np.inf)
+    return low, np.maximum(high, low)
+
+
+@dataclass(frozen=True)
+class _End:
+    """What the guaranteed rates ask for at one end of a part."""
+
+    v_s: FloatArray
+    share: npt.NDArray[np.complex128]
+    """``c e^{jβ}``."""
+    s: FloatArray
+    asked: FloatArray
+    room: FloatArray
+    """|z|."""
+
+
+def _asked(
+    row: SectorRow,
+    kappa_g: float,
+    v: npt.NDArray[np.complex128],
+    omega: FloatArray,
+    u: npt.NDArray[np.complex128],
+) -> _End:
+    v_s = np.maximum(np.maximum(np.abs(v), np.abs(omega) / kappa_g), 1e-300)
+    share, z = v / v_s, u / v_s
+    e = np.where(np.abs(share) > 0, share / np.maximum(np.abs(share), 1e-300), 1.0)
+    asked = row.kappa_share * np.abs((e * np.conj(row.b)).imag)
+    asked = asked + row.beta_share * np.abs((share * z.conj()).real)
+    return _End(v_s, share, omega / kappa_g / v_s, asked, np.abs(z))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from configspace import PermissibleSpace
-from configspace.space import fingerprint
+from configspace.sheet import fingerprint
 from omniplan.motion import Motion
 from omniplan.rows import Judge, Tolerances
 from omniplan.sheet_judge import SheetJudge

@@ -12,6 +12,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from omniplan.wording import describe
+
 __all__ = ["Advice", "Candidate", "Ranking", "Report", "Violation"]
 
 
@@ -60,8 +62,6 @@ class Violation:
 
     def __str__(self) -> str:
         """Return one line with wheel, limit, place and numbers."""
-        from omniplan.wording import describe
-
         return describe(self)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-from omniplan.report import Ranking, Report, Violation
+if TYPE_CHECKING:
+    from omniplan.report import Ranking, Report, Violation
 
 __all__ = ["describe", "refusal", "report_lines"]
 

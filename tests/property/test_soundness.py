@@ -240,6 +240,8 @@ def random_boxes(
     kappa_n = np.where(case == 1, np.copysign(2, kappa_n), kappa_n)  # at a pole
     half_b = np.where((case == 1) & (beta > 0), np.pi, half_b)  # the whole ring
     half_k = np.where(case == 2, 0.0, half_k)
+    if space.is_translating:
+        half_k = np.where(rng.random(count) < 0.9, 0.0, half_k)
     half_b = np.where(case == 3, 0.0, half_b)
     return (
         np.clip(kappa_n - half_k, -2, 2),
@@ -275,6 +277,97 @@ def test_free_boxes_are_permitted_all_over(kind: VehicleKind) -> None:
                 assert (v_low <= slowest * (1 + 1e-12))[state == FREE].all()
             seen += np.bincount(state, minlength=3)
     assert seen[FREE] > (0.03 if kind == "guaranteed" else 0.1) * seen.sum()
+
+
+def trace(
+    space: PermissibleSpace, start: np.ndarray, end: np.ndarray, depth: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cut straight pieces (n, 2) into boxes until they are settled or `depth` is out.
+
+    Returns the index of the piece, the shares (least, largest) of it and v_low, of the
+    parts that are free.
+    """
+    which = np.repeat(np.arange(len(start)), 8)
+    share = np.tile(
+        np.stack([np.arange(8) / 8, np.arange(1, 9) / 8], axis=-1), (len(start), 1)
+    )
+    found = []
+    for _ in range(depth):
+        at = start[which][:, None] + share[..., None] * (end - start)[which][:, None]
+        low, high = at.min(axis=1), at.max(axis=1)
+        state, v_low = space.box(low[:, 0], high[:, 0], low[:, 1], high[:, 1])
+        free, mixed = state == FREE, state == MIXED
+        found.append((which[free], share[free], v_low[free]))
+        middle = share[mixed].mean(axis=1)
+        share = np.concatenate(
+            [
+                np.stack([share[mixed][:, 0], middle], axis=-1),
+                np.stack([middle, share[mixed][:, 1]], axis=-1),
+            ]
+        )
+        which = np.tile(which[mixed], 2)
+    return tuple(np.concatenate(part) for part in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def pieces(
+    rng: np.random.Generator, space: PermissibleSpace, vehicle: Vehicle, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Straight pieces in the plane, from a tenth of a cell to twenty cells long."""
+    start = np.stack(random_configurations(rng, vehicle, count), axis=-1)
+    cells = 10.0 ** rng.uniform(-1, 1.3, count)
+    angle = rng.uniform(-np.pi, np.pi, count)
+    step = np.stack(
+        [
+            4 / space.grid.n_kappa * np.cos(angle),
+            2 * np.pi / space.grid.n_beta * np.sin(angle),
+        ],
+        axis=-1,
+    )
+    end = start + cells[:, None] * step
+    end[:, 0] = np.clip(end[:, 0], -2, 2)
+    if space.line_beta is not None:
+        start[:, 1] = end[:, 1] = space.line_beta
+    if space.is_translating:
+        start[:, 0] = end[:, 0] = 0.0
+    return start, end
+
+
+def follow(
+    seed: int, n_vehicles: int, per_vehicle: int, samples: int
+) -> tuple[int, int]:
+    """Trace pieces and hold what is free against dense samples; count both."""
+    rng = np.random.default_rng(seed)
+    n_free = n_samples = 0
+    for i in range(n_vehicles):
+        vehicle = random_vehicle(rng, ALL_KINDS[i % len(ALL_KINDS)])
+        space = build(vehicle, random_grid(rng))
+        start, end = pieces(rng, space, vehicle, per_vehicle)
+        for one in (space, replace(space, vehicle=None)):
+            which, share, v_low = trace(one, start, end, 6)
+            place = rng.random((which.size, samples))
+            place[:, :2] = 0, 1
+            at = share[:, :1] + place * (share[:, 1:] - share[:, :1])
+            points = (
+                start[which][:, None] + at[..., None] * (end - start)[which][:, None]
+            )
+            truth = rigid_body(vehicle, points[..., 0], points[..., 1])
+            assert not truth.is_blocked.any()
+            assert (v_low[:, None] <= truth.v_max * (1 + 1e-12)).all()
+        n_free, n_samples = n_free + which.size, n_samples + at.size
+    return n_free, n_samples
+
+
+def test_free_parts_of_straight_pieces_are_permitted() -> None:
+    n_free, _ = follow(20, 24, 100, 8)
+    assert n_free > 5000
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_hundred_thousand_straight_pieces_are_sound() -> None:
+    n_free, n_samples = follow(2000, 200, 500, 12)
+    assert n_free > 500_000
+    assert n_samples > 5_000_000
 
 
 def test_tiny_boxes_are_as_fast_as_points() -> None:

@@ -5,11 +5,11 @@ from hypothesis import given
 
 import configspace
 from configspace import Reason
-from configspace.testing import configurations, rigid_body, vehicles
+from configspace.testing import ALL_KINDS, configurations, rigid_body, vehicles
 from configspace.vehicle import Vehicle
 
 
-@given(vehicles(), configurations())
+@given(vehicles(ALL_KINDS), configurations())
 def test_exact_speed_is_that_of_the_rigid_body(
     vehicle: Vehicle, configuration: tuple[float, float]
 ) -> None:
@@ -18,17 +18,20 @@ def test_exact_speed_is_that_of_the_rigid_body(
         other = rigid_body(vehicle, *configuration, reverse=reverse)
         v_max = float(configspace.exact_v_max(vehicle, *configuration, reverse=reverse))
         if other.is_clear():
-            assert v_max == pytest.approx(truth.permitted, rel=1e-9)
             assert v_max == pytest.approx(float(other.permitted), rel=1e-9)
+        # The loop version finds the rates by differences and tipping by bisection.
+        if other.is_clear(1e-6):
+            assert v_max == pytest.approx(truth.permitted, rel=1e-7)
 
 
-@given(vehicles(), configurations())
+@given(vehicles(ALL_KINDS), configurations())
 def test_a_reason_is_given_for_every_answer(
     vehicle: Vehicle, configuration: tuple[float, float]
 ) -> None:
     v_max = float(configspace.exact_v_max(vehicle, *configuration))
     why, who = configspace.exact_reason(vehicle, *configuration)
     blocking = Reason.STEER_RANGE | Reason.SINGULAR | Reason.FIXED_WHEEL
+    blocking |= Reason.PARALLEL_WHEELS
     assert int(why) != 0
     assert (int(why) & blocking != 0) == (v_max == 0)
     assert -1 <= int(who) < len(vehicle.wheels)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 
 import configspace
-from configspace.testing import configurations, random_vehicle, vehicles
-from configspace.vehicle import Castor, SteeredWheel, Vehicle
+from configspace.testing import ALL_KINDS, configurations, random_vehicle, vehicles
+from configspace.vehicle import Castor, SteerableWheel, Vehicle
 
 KINKS = [-2.0, -1.3, -1.0, -0.4, 0.0, 0.4, 1.0, 1.3, 2.0]
 
@@ -33,7 +33,7 @@ def assert_paper(vehicle: Vehicle, kappa_n: float, beta: float, v_s: float) -> N
     kx, ky = naive.reference(vehicle)
     kg = naive.kappa_g(vehicle)
     for i, wheel in enumerate(vehicle.wheels):
-        if not isinstance(wheel, SteeredWheel):
+        if not isinstance(wheel, SteerableWheel):
             continue
         angle, speed = naive.steered_wheel(
             kappa_n, beta, v_s, kg, wheel.x - kx, wheel.y - ky
@@ -58,7 +58,7 @@ def test_steered_wheels_follow_the_papers_cases(
     assert_paper(configspace.load_vehicle("ift-four-steered"), kappa_n, beta, v_s)
 
 
-@given(vehicles(("steered", "mixed")), configurations())
+@given(vehicles(("steered", "mixed", "turntable", "loaded")), configurations())
 def test_steered_wheels_follow_the_papers_cases_on_any_vehicle(
     vehicle: Vehicle, configuration: tuple[float, float]
 ) -> None:
@@ -156,7 +156,7 @@ def test_wheels_move_as_a_simulated_rigid_body(seed: int) -> None:
             return np.array([x, y])
 
         moved = (place(h) - place(-h)) / (2 * h)
-        if isinstance(wheel, SteeredWheel):
+        if isinstance(wheel, SteerableWheel):
             rolled = u[i] * np.array([math.cos(alpha[i]), math.sin(alpha[i])])
             np.testing.assert_allclose(rolled, moved, atol=1e-6)
         else:

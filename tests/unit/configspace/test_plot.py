@@ -72,12 +72,18 @@ def test_mixed_cells_are_those_of_the_table(four_steered: PermissibleSpace) -> N
     assert 0 < share == pytest.approx(mixed.mean())
 
 
-def test_map_of_a_sheet_counts_mixed_cells_as_blocked(
+def test_map_of_a_sheet_shows_what_the_sheet_permits(
     four_steered: PermissibleSpace,
 ) -> None:
     sheet = parse_space(dump_space(four_steered))
-    _, _, v_max, mixed = cell_values(sheet)
-    assert np.isnan(v_max[mixed]).all()
+    kappa_n, beta, v_max, mixed = cell_values(sheet)
+    _, _, known, _ = cell_values(four_steered)
+    answers = sheet.v_max(kappa_n[:, np.newaxis], beta)
+    np.testing.assert_array_equal(np.nan_to_num(v_max), answers)
+    # In mixed cells some parts are free, the others count as blocked.
+    assert 0 < np.isnan(v_max[mixed]).mean() < 1
+    assert np.isnan(v_max[np.isnan(known)]).all()
+    np.testing.assert_array_equal(v_max[~mixed], known[~mixed])
 
 
 def test_surface_stays_within_the_permitted_area(
