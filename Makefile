@@ -30,7 +30,7 @@ test: $(VENV)/.dev ## all checks and tests but the slow ones; what CI runs
 	$(MAKE) --no-print-directory check
 
 check: $(VENV)/.dev lint types layers examples ## format, lint, types, layers, examples, tests
-	$(BIN)/python -m pytest -m "not slow" $(TESTS)
+	$(BIN)/python -m pytest -m "not slow" -n 2 $(TESTS)
 
 test-fast: $(VENV)/.dev ## unit tests only
 	$(BIN)/python -m pytest -m "not slow" tests/unit $(TESTS)

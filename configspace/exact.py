@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 
@@ -163,6 +164,8 @@ def _blocked(
     if line is not None:
         off = (np.abs(wrap(np.angle(e) - line)) > LINE_TOLERANCE) & (c > 0)
         why = np.where(off, np.uint16(Reason.FIXED_WHEEL), why)
+        # A pole is one configuration, and left along the line.
+        e = np.where(c > 0, e, cmath.exp(1j * line))
     if vehicle.mobility.is_translating:
         turns = np.abs(s) > LINE_TOLERANCE
         why = np.where(turns, np.uint16(Reason.PARALLEL_WHEELS), why)

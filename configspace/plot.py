@@ -7,21 +7,17 @@ made without pyplot, so there is no global state.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from pathlib import Path
 
-from matplotlib import rc_context
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from configspace.errors import InvalidInput, Problem
 from configspace.plot_data import require_curve, require_plane
 from configspace.plot_facets import wheel_index
 from configspace.plot_maps import draw_blocked, draw_curve, draw_map, draw_tile
 from configspace.plot_sketch import draw_sketch
-from configspace.plot_style import STEPS, new_figure, side_by_side, title
+from configspace.plot_style import STEPS, new_figure, save_figure, side_by_side, title
 from configspace.plot_surfaces import (
     draw_rolling_speed,
     draw_steering_angle,
@@ -40,9 +36,6 @@ __all__ = [
     "plot_surface",
     "save_figure",
 ]
-
-MAX_PNG_BYTES = 300_000
-"""`save_figure` lowers the resolution of a PNG until it is smaller."""
 
 
 def plot_surface(space: PermissibleSpace, *, reverse: bool = False) -> Figure:
@@ -68,7 +61,7 @@ def plot_surface(space: PermissibleSpace, *, reverse: bool = False) -> Figure:
     Brenner and Colomb 2022, figures 12 and 13.
     """
     require_plane(space)
-    figure = new_figure(6.4, 4.6)
+    figure = new_figure(5.8, 4.3)
     draw_surface(figure, space, reverse)
     figure.suptitle(title(space, reverse=reverse))
     return figure
@@ -121,9 +114,9 @@ def plot_blocked(space: PermissibleSpace) -> Figure:
     Brenner and Colomb 2022, figure 9.
     """
     require_plane(space)
-    figure = new_figure(6.0, 5.2)
+    figure = new_figure(5.8, 5.0)
     draw_blocked(figure.add_subplot(), space)
-    figure.suptitle(_named(space, "blocked configurations"))
+    figure.suptitle(_named(space, "blocked configurations"), fontsize="medium")
     return figure
 
 
@@ -185,9 +178,10 @@ def plot_steering_angle(space: PermissibleSpace, wheel: int | str) -> Figure:
     """
     require_plane(space)
     index = wheel_index(space, wheel)
-    figure = new_figure(6.4, 5.0)
+    figure = new_figure(5.8, 4.6)
     draw_steering_angle(figure, space, index, index + 1)
-    figure.suptitle(_named(space, f"steering angle of {_called(space, index)}"))
+    what = _named(space, f"steering angle of {_called(space, index)}")
+    figure.suptitle(what, fontsize="medium")
     return figure
 
 
@@ -217,10 +211,10 @@ def plot_rolling_speed(space: PermissibleSpace, wheel: int | str) -> Figure:
     """
     require_plane(space)
     index = wheel_index(space, wheel)
-    figure = new_figure(6.4, 4.8)
+    figure = new_figure(5.8, 4.4)
     draw_rolling_speed(figure, space, index, index + 1)
     what = _named(space, f"rolling speed of {_called(space, index)}")
-    figure.suptitle(rf"{what}, at $v_s$ = 1 m/s")
+    figure.suptitle(rf"{what}, at $v_s$ = 1 m/s", fontsize="medium")
     return figure
 
 
@@ -242,7 +236,7 @@ def plot_space(space: PermissibleSpace) -> Figure:
         draw_curve(parts[0].add_subplot(), space)
     else:
         figure = new_figure(15.0, 4.6)
-        parts = side_by_side(figure, (1.25, 1.2, 1.0))
+        parts = side_by_side(figure, (1.35, 1.2, 1.0))
         draw_surface(parts[0], space, False)
         draw_map(parts[1].add_subplot(), space, False)
     draw_sketch(parts[-1].add_subplot(), space)
@@ -286,43 +280,6 @@ def plot_catalog(spaces: Sequence[PermissibleSpace], columns: int = 8) -> Figure
         r"maps: $\beta$ from −180° to 180°; curves: $v_{\max}$", fontsize="medium"
     )
     return figure
-
-
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG (smaller than 300 kB) or SVG, by the suffix.
-
-    Parameters
-    ----------
-    figure : Figure
-    path : str or Path
-        Ends in ``.png`` or ``.svg``.
-
-    Raises
-    ------
-    InvalidInput
-        If the suffix is another one or the file cannot be written.
-    """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in {".png", ".svg"}:
-        raise InvalidInput(Problem("path", str(path), "must end in .png or .svg"))
-    buffer = io.BytesIO()
-    if suffix == ".svg":
-        # Without a date and with a fixed salt the same figure gives the same file.
-        with rc_context({"svg.hashsalt": "omniplan"}):
-            figure.savefig(buffer, format="svg", dpi=150, metadata={"Date": None})
-    else:
-        for dpi in (150, 130, 115, 100, 85, 70, 50):
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format="png", dpi=dpi)
-            if buffer.tell() < MAX_PNG_BYTES:
-                break
-    try:
-        path.write_bytes(buffer.getvalue())
-    except OSError as error:
-        raise InvalidInput(
-            Problem("path", f"{path}: {error.strerror}", "must be writable")
-        ) from error
 
 
 def _named(space: PermissibleSpace, what: str) -> str:

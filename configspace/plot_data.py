@@ -182,7 +182,7 @@ def steering_span(wheel: SteerableWheel) -> tuple[float, float]:
     return (least + largest) / 2, min((largest - least) / 2, math.pi)
 
 
-def wheel_bodies(wheel: Wheel) -> tuple[tuple[complex, float], ...]:
+def wheel_bodies(wheel: Wheel | SteerableWheel) -> tuple[tuple[complex, float], ...]:
     """Return place and rolling direction of everything that rolls in a wheel unit.
 
     Steering angles are 0, or in the middle of the range where 0 is not in it. A wheel

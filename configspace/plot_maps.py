@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -74,11 +77,12 @@ def draw_blocked(axes: Axes, space: PermissibleSpace) -> None:
             facecolors="black",
             edgecolors="black",
             linewidths=0.6,
+            joinstyle="round",  # mitres would stick out
         ),
         autolim=False,
     )
-    keys = [Patch(color="black", label="blocked")] if blocked else []
-    mark = {
+    keys: list[Artist] = [Patch(color="black", label="blocked")] if blocked else []
+    mark: dict[str, Any] = {
         "marker": "o",
         "markersize": 7,
         "markerfacecolor": "white",
@@ -210,7 +214,8 @@ def _draw_contours(
         lines, fmt="%.3g", fontsize="small", inline=False, colors="black"
     )
     for label in labels:
-        if abs(label.get_position()[1]) > 155:  # would be cut off at the frame
+        x, y = label.get_position()
+        if abs(x) > 1.9 or abs(y) > 155:  # would be cut off at the frame
             label.remove()
             continue
         label.set_path_effects([withStroke(linewidth=3, foreground="white")])

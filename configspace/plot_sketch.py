@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -169,17 +170,17 @@ def _draw_steering(axes: Axes, wheel: SteerableWheel, length: float) -> None:
         axes.plot(x, y, **_AXIS)
 
 
-_AXIS = {
+_AXIS: dict[str, Any] = {
     "marker": "o",
-    "markersize": 5,
-    "markerfacecolor": "white",
-    "markeredgecolor": "black",
+    "markersize": 6,
+    "markerfacecolor": "black",
+    "markeredgecolor": "white",
     "linestyle": "",
     "zorder": 4,
 }
 
 
-def _tread(length: float, turn: Transform, **look: object) -> Rectangle:
+def _tread(length: float, turn: Transform, **look: Any) -> Rectangle:
     corner = (-length / 2, -_TREAD * length / 2)
     return Rectangle(corner, length, _TREAD * length, transform=turn, **look)
 
@@ -216,7 +217,7 @@ def _draw_effective_track(axes: Axes, vehicle: Vehicle, length: float) -> list[A
         turned = turn + axes.transData
         axes.add_patch(_tread(length, turned, fc="none", ec="C1", ls="--", zorder=4))
     first, second = list(sides)[:2]
-    look = {"color": "C1", "linestyle": "--", "linewidth": 1.2}
+    look: dict[str, Any] = {"color": "C1", "linestyle": "--", "linewidth": 1.2}
     axes.plot([first.real, second.real], [first.imag, second.imag], **look, zorder=4)
     track = f"effective track {abs(first - second):.3g} m"
     return [Line2D([], [], **look, label=track)]
@@ -225,12 +226,12 @@ def _draw_effective_track(axes: Axes, vehicle: Vehicle, length: float) -> list[A
 def _draw_load(axes: Axes, vehicle: Vehicle, load: Load, radius: float) -> list[Artist]:
     """Draw the centre of gravity and the polygon it has to stay over."""
     x, y, height = load.center_of_gravity
-    outline = {"ec": _LOAD, "ls": "-.", "lw": 1.2}
+    outline: dict[str, Any] = {"ec": _LOAD, "ls": "-.", "lw": 1.2}
     axes.add_patch(Polygon(support_polygon(vehicle), fc="none", zorder=2.5, **outline))
     axes.add_patch(Circle((x, y), radius, fc="white", ec=_LOAD, zorder=5))
     for start in (0, 180):
         axes.add_patch(Wedge((x, y), radius, start, start + 90, fc=_LOAD, zorder=5))
-    mark = {"marker": "o", "linestyle": "", "markerfacecolor": "white"}
+    mark: dict[str, Any] = {"marker": "o", "linestyle": "", "mfc": "white"}
     cog = f"centre of gravity, {height:.2g} m high"
     return [
         Line2D([], [], color=_LOAD, label=cog, **mark),
@@ -249,5 +250,5 @@ def _wheel_keys(wheels: Sequence[Wheel]) -> Iterator[Artist]:
     if any(wheel.max_speed is None for wheel in rolling):
         yield Patch(fc=_PASSIVE, ec="black", label="wheel without drive")
     if len(rolling) < len(wheels):
-        mark = {"marker": "o", "markerfacecolor": "white", "linestyle": ""}
+        mark: dict[str, Any] = {"marker": "o", "mfc": "white", "linestyle": ""}
         yield Line2D([], [], color="black", label="castor", **mark)

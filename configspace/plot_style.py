@@ -1,17 +1,20 @@
-"""What all pictures of a permissible space share: labels, colours, legends."""
+"""What all pictures of a permissible space share: labels, colours, legends, files."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
 
+from configspace.errors import InvalidInput, Problem
 from configspace.space import PermissibleSpace
 
 __all__ = [
@@ -24,6 +27,7 @@ __all__ = [
     "V_MAX",
     "legend_below",
     "new_figure",
+    "save_figure",
     "side_by_side",
     "speed_scale",
     "title",
@@ -39,6 +43,9 @@ BETA_TICKS = (-180, -90, 0, 90, 180)
 SPEEDS: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.3, 1.0, 256)))
 STEPS = SPEEDS.resampled(20)
 """The same in steps: bands in place of contours, and smaller files."""
+
+MAX_PNG_BYTES = 300_000
+"""`save_figure` lowers the resolution of a PNG until it is smaller."""
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -56,7 +63,7 @@ def side_by_side(figure: Figure, widths: tuple[float, ...]) -> list[SubFigure]:
 
 
 def title(space: PermissibleSpace, *, reverse: bool = False) -> str:
-    """Return the title of a picture; it says forwards or backwards where they differ."""
+    """Return a title that says forwards or backwards where they differ."""
     name = space.name.replace("$", r"\$")  # not a formula
     way = ""
     is_plane = space.line_beta is None and not space.is_translating
@@ -80,3 +87,40 @@ def legend_below(axes: Axes, handles: Sequence[Artist], columns: int = 3) -> Non
             fontsize="small",
             frameon=False,
         )
+
+
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG (smaller than 300 kB) or SVG, by the suffix.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : str or Path
+        Ends in ``.png`` or ``.svg``.
+
+    Raises
+    ------
+    InvalidInput
+        If the suffix is another one or the file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in {".png", ".svg"}:
+        raise InvalidInput(Problem("path", str(path), "must end in .png or .svg"))
+    buffer = io.BytesIO()
+    if suffix == ".svg":
+        # Without a date and with a fixed salt the same figure gives the same file.
+        with rc_context({"svg.hashsalt": "omniplan"}):
+            figure.savefig(buffer, format="svg", dpi=150, metadata={"Date": None})
+    else:
+        for dpi in (150, 130, 115, 100, 85, 70, 50):
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format="png", dpi=dpi, pil_kwargs={"optimize": True})
+            if buffer.tell() < MAX_PNG_BYTES:
+                break
+    try:
+        path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise InvalidInput(
+            Problem("path", f"{path}: {error.strerror}", "must be writable")
+        ) from error

@@ -132,7 +132,7 @@ def _draw(
         MultipleLocator(look.step) if look.step else MaxNLocator(5, steps=[1, 2, 5, 10])
     )
     axes.zaxis.set_major_locator(locator)
-    axes.set_box_aspect((1.0, 1.15, look.rise), zoom=1.0)
+    axes.set_box_aspect((1.0, 1.15, look.rise), zoom=0.95)
     axes.view_init(elev=look.elevation, azim=look.azimuth)
 
 
@@ -150,6 +150,8 @@ def _add(
         facecolors=faces,
         edgecolors=edges,
         linewidths=0.4,
+        # No hairlines between black facets.
+        antialiaseds=bool(faces[:, :3].any()),
         zorder=order,
         rasterized=True,
     )
@@ -174,7 +176,8 @@ def _sizes(facets: Facets) -> FloatArray:
     Lines around them all would darken a dense part of the net.
     """
     spans = [np.ptp(facet[:, :2], axis=0) / (1 / 12, np.pi / 30) for facet in facets]
-    return np.clip(np.min(np.reshape(spans, (-1, 2)), axis=1), 0, 1) ** 2
+    least = np.min(np.reshape(spans, (-1, 2)), axis=1)
+    return np.asarray(np.clip(least, 0, 1) ** 2)
 
 
 def _heights(facets: Facets) -> FloatArray:

@@ -34,7 +34,8 @@ def support_edges(
     ValueError
         If the contacts do not span an area or the point is not inside.
     """
-    corners = np.array([(w.real, w.imag) for w in contacts])
+    # Seen from the point, so that small distances keep their digits.
+    corners = np.array([((w - point).real, (w - point).imag) for w in contacts])
     try:
         hull = ConvexHull(corners)
     except (QhullError, ValueError) as error:
@@ -43,8 +44,8 @@ def support_edges(
             "tipping; all wheels that carry, castors too, must be given"
         ) from error
     # Qhull writes outward normals: n x + e <= 0 inside. Facets may repeat.
-    for nx, ny, e in np.unique(hull.equations.round(12), axis=0):
-        distance = -(nx * point.real + ny * point.imag + e)
+    for nx, ny, e in np.unique(hull.equations, axis=0):
+        distance = -e
         if distance <= 0:
             raise ValueError(
                 "load: the centre of gravity is not inside the polygon of the wheel "

@@ -195,6 +195,9 @@ def rigid_body(
     kappa_n, beta = np.broadcast_arrays(
         np.asarray(kappa_n, np.float64), np.asarray(beta, np.float64)
     )
+    line = vehicle.mobility.line_beta
+    if line is not None:  # on the spot β means nothing; the line is the way to leave
+        beta = np.where(np.abs(kappa_n) == 2, line, beta)
     gentle = np.abs(kappa_n) < 1
     v = np.where(gentle, 1.0, 2 - np.abs(kappa_n))
     omega = vehicle.boundary_curvature * np.where(
@@ -224,11 +227,9 @@ def rigid_body(
             if wheel.max_speed is not None:
                 slowest = np.minimum(slowest, wheel.max_speed / np.abs(u))
         slowest = np.minimum(slowest, _body_bound(vehicle, vx, vy, omega, reverse))
-    line = vehicle.mobility.line_beta
     off = np.zeros(kappa_n.shape)
     if line is not None:
-        turning = np.abs(kappa_n) < 2
-        off = np.where(turning, np.abs(np.angle(np.exp(1j * (beta - line)))), 0.0)
+        off = np.abs(np.angle(np.exp(1j * (beta - line))))
     if vehicle.mobility.is_translating:
         off = np.abs(kappa_n)
     # About a nano-radian beside the line is rounding: neither clear.

@@ -19,9 +19,12 @@ from configspace.errors import InvalidVehicle, Problem
 from configspace.vehicle import (
     Castor,
     FixedWheel,
+    Guaranteed,
     Limits,
+    Load,
     MecanumWheel,
     OmniWheel,
+    SkidSteer,
     SteeredWheel,
     Turntable,
     Vehicle,
@@ -36,6 +39,12 @@ _WHEELS: dict[str, type[BaseModel]] = {
     "mecanum": MecanumWheel,
     "omni": OmniWheel,
     "castor": Castor,
+}
+_PARTS: dict[str, type[BaseModel]] = {
+    "limits": Limits,
+    "load": Load,
+    "guaranteed": Guaranteed,
+    "skid_steer": SkidSteer,
 }
 
 
@@ -248,9 +257,6 @@ def _suggestion(error: ErrorDetails) -> str:
 def _allowed_keys(location: tuple[int | str, ...]) -> Iterator[str]:
     model: type[BaseModel] = Vehicle
     for part in location[:-1]:
-        if part in _WHEELS:
-            model = _WHEELS[str(part)]
-        elif part == "limits":
-            model = Limits
+        model = _WHEELS.get(str(part), _PARTS.get(str(part), model))
     fields: Mapping[str, object] = model.model_fields
     return iter(fields)

@@ -226,7 +226,9 @@ def exact(
     vx, vy, omega = twist(kappa_n, beta, 1.0, kg)
     bound, margin, stillness, spare = math.inf, math.inf, math.inf, math.inf
     line = constant_beta(vehicle)
-    if line is not None and abs(kappa_n) != 2:
+    if line is not None:
+        if abs(kappa_n) == 2:  # the pole is one configuration, left along the line
+            beta = line
         off = abs(math.remainder(beta - line, 2 * math.pi))
         margin = min(margin, 2e-9 - off)
     if vehicle.synchro:

@@ -77,3 +77,72 @@ def test_interpolated_loads_are_never_too_small_and_cells_agree_with_nodes() -> 
     assert (space.tables.load[0] >= exact**-2.0).all()
     assert (space.tables.v_lo[0] <= exact[:-1, :-1]).all()
     assert (space.tables.v_hi[0] >= exact[1:, 1:]).all()
+
+
+OFFSET = {"type": "steered", "max_speed": 1.0, "offset": 0.5}
+
+
+def build(grid: Grid, *wheels: dict[str, object], **more: object) -> object:
+    named = [{"id": f"w{i}", **wheel} for i, wheel in enumerate(wheels)]
+    vehicle = configspace.vehicle_from_data({"name": "v", "wheels": named, **more})
+    return configspace.build_space(vehicle, grid, cache=False)
+
+
+@pytest.mark.parametrize("grid", [Grid(4, 8), Grid(16, 24), Grid(44, 90), Grid()])
+def test_wheels_that_can_stand_still_together_bound_no_speed(grid: Grid) -> None:
+    # The centre of rotation may be under both wheels, half a metre beside both axes.
+    pair = [{**OFFSET, "x": x, "y": 0.0} for x in (0.3, -0.3)]
+    with pytest.raises(configspace.InvalidVehicle, match="limit"):
+        build(grid, *pair)
+    apart = [{**wheel, "x": 2 * float(str(wheel["x"]))} for wheel in pair]
+    build(grid, *apart)  # 1.2 m apart: no such point
+    other = [pair[0], {**pair[1], "offset": -0.5}]
+    build(grid, *other)  # one of them stands in left turns, the other in right turns
+
+
+@pytest.mark.parametrize("grid", [Grid(4, 8), Grid(8, 12), Grid(16, 24)])
+@pytest.mark.parametrize("place", ["reference", "center_of_gravity"])
+def test_fast_vehicles_with_slow_loads_are_built_on_coarse_grids(
+    grid: Grid, place: str
+) -> None:
+    wheels = [
+        {
+            "type": "omni",
+            "x": 0.3 * np.cos(at),
+            "y": 0.3 * np.sin(at),
+            "heading_deg": np.degrees(at) + 90,
+            "max_speed": speed,
+        }
+        for at, speed in ((0.0, 60.0), (2.1, 50.0), (4.2, 40.0))
+    ]
+    limits = {"max_lateral_acceleration": 1.0, "lateral_acceleration_at": place}
+    load = {"center_of_gravity": [0.02, 0.0, 1.0]}
+    build(grid, *wheels, limits=limits, load=load)
+
+
+def test_a_turntable_alone_bounds_the_speed() -> None:
+    # Its wheels cannot both stand still where the vehicle moves.
+    table = {"type": "turntable", "x": 0.5, "y": 0.1, "track": 0.3, "max_speed": 1.0}
+    build(Grid(), table)
+
+
+def test_lateral_acceleration_and_tipping_alone_do_not_bound_translation() -> None:
+    wheel = {"type": "steered", "x": 0.5, "y": 0.0}
+    castors = [{"type": "castor", "x": -0.5, "y": y} for y in (-0.5, 0.5)]
+    load = {"center_of_gravity": [0.0, 0.0, 1.0]}
+    with pytest.raises(configspace.InvalidVehicle, match="limit"):
+        build(
+            Grid(16, 24),
+            wheel,
+            *castors,
+            load=load,
+            limits={"max_lateral_acceleration": 1.0},
+        )
+
+
+def test_synchro_drives_have_one_row_of_cells() -> None:
+    space = configspace.build_space(
+        configspace.load_vehicle("synchro-drive"), Grid(16, 24), cache=False
+    )
+    assert space.tables.state.shape == (1, 24)
+    assert space.tables.load.shape[1:] == (2, 25)

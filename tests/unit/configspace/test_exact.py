@@ -81,3 +81,26 @@ def test_direction_decides_whether_an_angle_is_in_range(
     )
     assert (configspace.exact_v_max(vehicle, 0.0, np.radians(permitted)) > 0).all()
     assert (configspace.exact_v_max(vehicle, 0.0, np.radians(blocked)) == 0).all()
+
+
+def test_the_pole_of_a_line_mobile_vehicle_is_one_configuration() -> None:
+    # Guaranteed rates ask how fast the wheel turns on leaving the pole, which such a
+    # vehicle can do along its line only.
+    wheels = [
+        {"id": "l", "type": "fixed", "x": 0.0, "y": 0.3, "max_speed": 1.0},
+        {"id": "r", "type": "fixed", "x": 0.0, "y": -0.3, "max_speed": 1.0},
+        {"id": "s", "type": "steered", "x": 0.5, "y": 0.0},
+    ]
+    wheels[2]["max_steering_rate_deg"] = 60
+    beta = np.linspace(-np.pi, np.pi, 9)
+    for rate, is_permitted in ((0.8, True), (6.0, False)):
+        vehicle = configspace.vehicle_from_data(
+            {"name": "v", "wheels": wheels, "guaranteed": {"kappa_rate": rate}}
+        )
+        v_max = configspace.exact_v_max(vehicle, 2.0, beta)
+        np.testing.assert_array_equal(v_max > 0, is_permitted)
+        space = configspace.build_space(vehicle, configspace.Grid(16, 24), cache=False)
+        for pole in (2.0, -2.0):
+            np.testing.assert_array_equal(space.v_max(pole, beta) > 0, is_permitted)
+            why, _ = configspace.exact_reason(vehicle, pole, beta)
+            assert ((why & configspace.Reason.SINGULAR != 0) != is_permitted).all()

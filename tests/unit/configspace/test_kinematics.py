@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 
 import configspace
-from configspace.testing import ALL_KINDS, configurations, random_vehicle, vehicles
+from configspace.testing import configurations, random_vehicle, vehicles
 from configspace.vehicle import Castor, SteerableWheel, Vehicle
 
 KINKS = [-2.0, -1.3, -1.0, -0.4, 0.0, 0.4, 1.0, 1.3, 2.0]

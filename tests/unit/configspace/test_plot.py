@@ -12,25 +12,35 @@ from configspace import (
     InvalidInput,
     PermissibleSpace,
     build_space,
+    catalog,
     dump_space,
     load_vehicle,
     parse_space,
     vehicle_from_data,
 )
 from configspace.plot import (
-    blocked_ranges,
-    cell_values,
+    plot_blocked,
+    plot_catalog,
     plot_curve,
     plot_map,
+    plot_rolling_speed,
     plot_space,
+    plot_steering_angle,
     plot_surface,
     save_figure,
-    surface_polygons,
 )
+from configspace.plot_data import blocked_ranges, cell_values
+from configspace.plot_facets import surface_polygons
 
 GRID = Grid(80, 120)
 NAMES = ("ackermann", "differential", "ift-four-steered", "mecanum")
 PLANAR = ("ift-four-steered", "mecanum")
+# One of each kind of sketch and picture; the others are drawn in the slow run.
+FEW = ("exomars", "husky", "synchro-drive", "two-turntables")
+CATALOG = [
+    pytest.param(name, marks=() if name in FEW else pytest.mark.slow)
+    for name in catalog()
+]
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +56,11 @@ def four_steered(spaces: dict[str, PermissibleSpace]) -> PermissibleSpace:
 def labels(figure: Any) -> str:
     texts = figure.findobj(lambda artist: hasattr(artist, "get_fontsize"))
     return " ".join(text.get_text() for text in texts)
+
+
+def zlim(figure: Any) -> tuple[float, float]:
+    low, high = figure.axes[0].get_zlim()
+    return low, high
 
 
 def area(polygons: list[np.ndarray]) -> float:
@@ -66,10 +81,18 @@ def test_map_shows_what_the_space_answers(four_steered: PermissibleSpace) -> Non
         assert answer in (0, v_max[i, j])
 
 
-def test_mixed_cells_are_those_of_the_table(four_steered: PermissibleSpace) -> None:
-    *_, mixed = cell_values(four_steered)
-    share = np.mean(four_steered.tables.state == 2)
-    assert 0 < share == pytest.approx(mixed.mean())
+def test_mixed_are_the_parts_of_mixed_cells_that_a_sheet_cannot_settle(
+    four_steered: PermissibleSpace,
+) -> None:
+    kappa_n, beta, _, mixed = cell_values(four_steered)
+    row = np.searchsorted(four_steered.grid.kappa_edges, kappa_n) - 1
+    column = np.searchsorted(four_steered.grid.beta_edges, beta) - 1
+    in_mixed_cells = four_steered.tables.state[np.ix_(row, column)] == 2
+    assert (in_mixed_cells[mixed]).all()
+    assert 0 < mixed.sum() < in_mixed_cells.sum()
+    sheet = parse_space(dump_space(four_steered))
+    answers = sheet.v_max(kappa_n[:, np.newaxis], beta)
+    np.testing.assert_array_equal(mixed, in_mixed_cells & (answers == 0))
 
 
 def test_map_of_a_sheet_shows_what_the_sheet_permits(
@@ -80,8 +103,7 @@ def test_map_of_a_sheet_shows_what_the_sheet_permits(
     _, _, known, _ = cell_values(four_steered)
     answers = sheet.v_max(kappa_n[:, np.newaxis], beta)
     np.testing.assert_array_equal(np.nan_to_num(v_max), answers)
-    # In mixed cells some parts are free, the others count as blocked.
-    assert 0 < np.isnan(v_max[mixed]).mean() < 1
+    assert np.isnan(v_max[mixed]).all()
     assert np.isnan(v_max[np.isnan(known)]).all()
     np.testing.assert_array_equal(v_max[~mixed], known[~mixed])
 
@@ -204,6 +226,94 @@ def test_overview_is_written_below_the_limit(
     content = (tmp_path / "space.png").read_bytes()
     assert content.startswith(b"\x89PNG")
     assert 20_000 < len(content) < 300_000
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_every_vehicle_of_the_catalogue_draws(name: str, tmp_path: Path) -> None:
+    space = build_space(load_vehicle(name), GRID, cache=False)
+    save_figure(plot_space(space), tmp_path / "space.png")
+    assert 20_000 < (tmp_path / "space.png").stat().st_size < 300_000
+
+
+def test_sketch_shows_turntables_and_load() -> None:
+    space = build_space(load_vehicle("two-turntables"), GRID, cache=False)
+    axes = plot_space(space).axes[-1]
+    treads = [patch for patch in axes.patches if type(patch).__name__ == "Rectangle"]
+    assert len(treads) == 4
+    text = labels(axes.figure)
+    for wanted in ("steering axis", "castor", "support polygon", "0.7 m high"):
+        assert wanted in text
+
+
+def test_sketch_shows_wheels_and_effective_track_of_a_skid_steer() -> None:
+    space = build_space(load_vehicle("husky"), GRID, cache=False)
+    axes = plot_space(space).axes[-1]
+    treads = [patch for patch in axes.patches if type(patch).__name__ == "Rectangle"]
+    assert [patch.get_linestyle() for patch in treads] == ["solid"] * 4 + ["--"] * 2
+    assert "effective track 1.04 m" in labels(axes.figure)
+
+
+def test_synchro_drive_is_a_curve_over_beta() -> None:
+    space = build_space(load_vehicle("synchro-drive"), GRID, cache=False)
+    figure = plot_curve(space)
+    beta, v_max = np.asarray(figure.axes[0].lines[0].get_data(), float)
+    assert (beta.min(), beta.max()) == (-180, 180)
+    np.testing.assert_allclose(v_max, 0.6, rtol=1e-6)
+    assert r"$\beta$ [°]" in labels(figure)
+    assert "turning radius" not in labels(figure)
+    for plot in (plot_surface, plot_map, plot_blocked):
+        with pytest.raises(InvalidInput, match="plot_curve"):
+            plot(space)
+
+
+def test_blocked_map_marks_the_singular_points(
+    four_steered: PermissibleSpace,
+) -> None:
+    figure = plot_blocked(four_steered)
+    assert len(figure.axes[0].lines) == 8
+    assert "centre of rotation on a steering axis" in labels(figure)
+    assert not plot_blocked(parse_space(dump_space(four_steered))).axes[0].lines
+
+
+def test_pictures_of_a_wheel_say_which(
+    four_steered: PermissibleSpace, tmp_path: Path
+) -> None:
+    angle = plot_steering_angle(four_steered, "front-right")
+    speed = plot_rolling_speed(four_steered, 3)
+    assert "steering angle of wheel 2 (front-right)" in labels(angle)
+    assert r"$\alpha_{2}$ [°]" in labels(angle)
+    assert "rolling speed of wheel 4 (rear-right), at $v_s$ = 1 m/s" in labels(speed)
+    assert r"$u_{4}$ [m/s]" in labels(speed)
+    assert zlim(speed)[1] > 2
+    for figure in (angle, speed):
+        save_figure(figure, tmp_path / "wheel.png")
+
+
+def test_wheel_that_rolls_backwards_is_drawn_below_the_ground(
+    spaces: dict[str, PermissibleSpace], tmp_path: Path
+) -> None:
+    figure = plot_rolling_speed(spaces["mecanum"], 0)
+    low, high = zlim(figure)
+    assert low < -1 < 1 < high
+    save_figure(figure, tmp_path / "wheel.png")
+
+
+def test_pictures_of_a_wheel_need_the_vehicle(four_steered: PermissibleSpace) -> None:
+    sheet = parse_space(dump_space(four_steered))
+    for plot in (plot_steering_angle, plot_rolling_speed):
+        with pytest.raises(InvalidInput, match="data sheet"):
+            plot(sheet, 0)
+        with pytest.raises(InvalidInput, match="one of front-left"):
+            plot(four_steered, "nobody")
+
+
+def test_overview_of_many_names_all(
+    spaces: dict[str, PermissibleSpace], tmp_path: Path
+) -> None:
+    figure = plot_catalog(list(spaces.values()), columns=3)
+    assert all(name in labels(figure) for name in NAMES)
+    assert "ift-four-steered\n1 m/s" in labels(figure)
+    save_figure(figure, tmp_path / "catalog.png")
 
 
 def test_overview_of_a_sheet_needs_no_vehicle(

@@ -214,14 +214,59 @@ def test_reasons_of_the_sheet_include_the_exact_ones(space_of: SpaceOf) -> None:
         assert (exact & ~table)[settled].max() == 0
 
 
-def test_sheet_counts_mixed_cells_as_blocked(ift: PermissibleSpace) -> None:
+def part(space: PermissibleSpace, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of one of the sixteen parts of all mixed cells."""
+    mixed = np.argwhere(space.tables.state == MIXED)
+    k, b = space.grid.kappa_edges, space.grid.beta_edges
+    kappa_n = k[mixed[:, 0]] + (index // 4 + 0.5) / 4 * (k[1] - k[0])
+    beta = b[mixed[:, 1]] + (index % 4 + 0.5) / 4 * (b[1] - b[0])
+    return kappa_n, beta
+
+
+def test_sheet_permits_the_free_parts_of_mixed_cells(ift: PermissibleSpace) -> None:
     sheet = sheet_of(ift)
     assert sheet.vehicle is None
-    mixed = np.argwhere(ift.tables.state == MIXED)
-    row, column = mixed[len(mixed) // 2]
-    kappa_n = (ift.grid.kappa_edges[row] + ift.grid.kappa_edges[row + 1]) / 2
-    beta = (ift.grid.beta_edges[column] + ift.grid.beta_edges[column + 1]) / 2
-    assert float(sheet.v_max(kappa_n, beta)) == 0
+    mixed = ift.tables.state == MIXED
+    seen = 0
+    for index in range(16):
+        free = (ift.tables.parts[mixed] >> index) & 1 == 1
+        at = part(ift, index)
+        np.testing.assert_array_equal(sheet.v_max(*at) > 0, free)
+        assert (ift.v_max(*at)[free] > 0).all()
+        seen += int(free.sum())
+    assert 0.2 < seen / (16 * mixed.sum()) < 0.8
+
+
+def test_box_inside_a_free_part_of_a_mixed_cell_is_free(ift: PermissibleSpace) -> None:
+    mixed = ift.tables.state == MIXED
+    size = 0.1 * np.array([4 / ift.grid.n_kappa, 2 * np.pi / ift.grid.n_beta])
+    for index in range(16):
+        free = (ift.tables.parts[mixed] >> index) & 1 == 1
+        kappa_n, beta = part(ift, index)
+        state, v_low = ift.box(
+            kappa_n - size[0], kappa_n + size[0], beta - size[1], beta + size[1]
+        )
+        np.testing.assert_array_equal(state, np.where(free, FREE, MIXED))
+        truth = rigid_body(configspace.load_vehicle("ift-four-steered"), kappa_n, beta)
+        assert (v_low <= truth.v_max).all()
+
+
+@pytest.mark.parametrize("with_vehicle", [True, False])
+def test_synchro_drives_translate_only(space_of: SpaceOf, with_vehicle: bool) -> None:
+    known = space_of("synchro-drive")
+    space = known if with_vehicle else sheet_of(known)
+    assert space.is_translating
+    assert space.line_beta is None
+    kappa_n = np.array([0.0, 1e-10, -1e-10, 1e-7, -0.3, 1.0, 2.0, -2.0])
+    expected = [True, True, True, False, False, False, False, False]
+    np.testing.assert_array_equal(space.v_max(kappa_n, 0.7) > 0, expected)
+    assert int(space.reason(0.3, 0.0)) & Reason.PARALLEL_WHEELS
+    assert not int(space.reason(0.0, 0.0)) & Reason.PARALLEL_WHEELS
+    zero, pi = np.zeros(1), np.array([np.pi])
+    assert space.box(zero, zero, zero, zero + 1e-3)[0][0] == FREE
+    for low, high in ((zero, zero + 0.1), (zero + 0.1, zero + 0.2), (zero - 2, zero)):
+        assert space.box(low, high, zero, zero + 1e-3)[0][0] != FREE
+    assert space.box(zero, zero, -pi, pi)[0][0] == FREE
 
 
 def test_box_inside_one_free_cell_is_free(ift: PermissibleSpace) -> None:

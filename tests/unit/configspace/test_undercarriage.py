@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import configspace
-from configspace.undercarriage import WheelPlace, mobility_of
+from configspace.undercarriage import WheelPlace, mobility_of, skid_contacts
 
 
 def fixed(name: str, x: float, y: float, heading: float = 0.0) -> WheelPlace:
@@ -80,3 +80,71 @@ def test_passive_standard_wheels_may_stand_beside_mecanum() -> None:
     rollers = WheelPlace("m", "mecanum", 1 + 0j, 0.0, driven=True)
     passive = WheelPlace("s", "steered", -1 + 0j, 0.0, driven=False)
     assert mobility_of([rollers, passive], 0j).line_beta is None
+
+
+def side(y: float, *xs: float, heading: float = 0.0) -> list[WheelPlace]:
+    turn = np.exp(1j * heading)
+    return [
+        WheelPlace(f"{y}-{x}", "fixed", complex(turn * complex(x, y)), heading, True)
+        for x in xs
+    ]
+
+
+@pytest.mark.parametrize("degrees", [0, 30, -120, 180])
+def test_skid_steered_wheels_gather_beside_their_middle(degrees: float) -> None:
+    heading = math.radians(degrees)
+    wheels = [
+        *side(0.3, -0.2, 0.4, heading=heading),
+        WheelPlace("c", "castor", 1 + 1j, 0.0, driven=False),
+        *side(-0.3, -0.2, 0.4, heading=heading),
+    ]
+    turn = np.exp(1j * heading)
+    left, right = turn * (0.1 + 0.5j), turn * (0.1 - 0.5j)
+    contacts = skid_contacts(wheels, 1.0)
+    np.testing.assert_allclose(contacts, [left, left, 1 + 1j, right, right])
+
+
+def test_skid_steered_wheels_may_be_mounted_backwards() -> None:
+    wheels = [*side(0.3, 0.2), *side(0.3, -0.2, heading=math.pi)]
+    # The second stands at -0.2 (-1) = 0.2 ahead and on the right.
+    np.testing.assert_allclose(skid_contacts(wheels, 1.0), [0.2 + 0.5j, 0.2 - 0.5j])
+
+
+@pytest.mark.parametrize(
+    ("wheels", "words"),
+    [
+        (side(0.3, -0.2, 0.2), "two sides"),
+        ([*side(0.3, 0.2), *side(-0.3, 0.2), *side(0.0, 0.2)], "two sides"),
+        ([*side(0.3, 0.2), *side(-0.3, 0.2, heading=0.1)], "parallel"),
+        ([*side(0.3, 0.2), WheelPlace("s", "steered", 0j, 0.0, True)], "s is steered"),
+        ([*side(0.3, 0.2), WheelPlace("o", "omni", 0j, 0.0, True)], "o is omni"),
+        ([WheelPlace("c", "castor", 0j, 0.0, False)], "castors only"),
+    ],
+)
+def test_skid_steered_wheels_form_two_sides(
+    wheels: list[WheelPlace], words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        skid_contacts(wheels, 1.0)
+
+
+def test_synchro_drives_translate_only() -> None:
+    steered = WheelPlace("a", "steered", 1 + 0j, 0.0, driven=True)
+    table = WheelPlace("t", "turntable", -1 + 0j, 0.0, driven=True)
+    castor = WheelPlace("c", "castor", 1j, 0.0, driven=False)
+    mobility = mobility_of([steered, table, castor], 0.1j, synchro=True)
+    assert mobility.is_translating
+    assert mobility.line_beta is None
+    assert mobility.reference == 0.1j
+    with pytest.raises(ValueError, match="f is fixed"):
+        mobility_of([steered, fixed("f", 0, 0)], 0j, synchro=True)
+    with pytest.raises(ValueError, match="castor"):
+        mobility_of([castor], 0j, synchro=True)
+
+
+def test_turntables_steer_and_do_not_mix_with_driven_rollers() -> None:
+    table = WheelPlace("t", "turntable", -1 + 0j, 0.0, driven=True)
+    assert mobility_of([table], 0j).line_beta is None
+    rollers = WheelPlace("m", "mecanum", 1 + 0j, 0.0, driven=True)
+    with pytest.raises(ValueError, match="driven standard wheel t"):
+        mobility_of([rollers, table], 0j)

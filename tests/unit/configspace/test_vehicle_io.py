@@ -10,6 +10,8 @@ from configspace.vehicle import Vehicle
 
 STEERED = {"id": "a", "type": "steered", "x": 0.4, "y": 0.2, "max_speed": 1.0}
 OTHER = {**STEERED, "id": "b", "x": -0.4}
+FIXED = {"id": "f", "type": "fixed", "x": 0.0, "y": -0.4, "max_speed": 1.0}
+CASTOR = {"id": "c", "type": "castor", "x": 0.0, "y": -0.4}
 
 
 def data(**changes: object) -> dict[str, object]:
@@ -18,6 +20,14 @@ def data(**changes: object) -> dict[str, object]:
 
 def wheel(**changes: object) -> dict[str, object]:
     return data(wheels=[{**STEERED, **changes}, OTHER])
+
+
+def loaded(
+    center_of_gravity: tuple[float, ...] | list[float] = (0.0, 0.0, 1.0),
+    **changes: object,
+) -> dict[str, object]:
+    load = {"center_of_gravity": list(center_of_gravity), **changes}
+    return data(wheels=[STEERED, OTHER, CASTOR], load=load)
 
 
 def problems(given: object) -> dict[str, str]:
@@ -119,7 +129,16 @@ def test_unknown_keys_keep_their_path_whatever_their_name(key: str) -> None:
         (wheel(max_speed=0), "wheels[0].max_speed"),
         (wheel(max_acceleration=-1.0), "wheels[0].max_acceleration"),
         (wheel(max_steering_rate_deg=-5), "wheels[0].max_steering_rate_deg"),
-        (wheel(offset=0.02), "wheels[0].offset"),
+        (wheel(offset=20), "wheels[0].offset"),  # millimetres
+        (wheel(offset=-1.01), "wheels[0].offset"),
+        (wheel(offset=float("nan")), "wheels[0].offset"),
+        (wheel(offset=None), "wheels[0].offset"),
+        (wheel(steering_coupling=-0.1), "wheels[0].steering_coupling"),
+        (wheel(steering_coupling=1.5), "wheels[0].steering_coupling"),
+        (wheel(type="turntable"), "wheels[0].track"),
+        (wheel(type="turntable", track=0), "wheels[0].track"),
+        (wheel(type="turntable", track=0.4, offset=0.1), "wheels[0].offset"),
+        (wheel(track=0.4), "wheels[0].track"),
         (wheel(steering_range_deg=[-90]), "wheels[0].steering_range_deg"),
         (wheel(steering_range_deg=[-90, 0, 90]), "wheels[0].steering_range_deg"),
         (wheel(steering_range_deg=[90, -90]), "wheels[0].steering_range_deg"),
@@ -131,6 +150,27 @@ def test_unknown_keys_keep_their_path_whatever_their_name(key: str) -> None:
         (data(limits={"max_speed": float("nan")}), "limits.max_speed"),
         (data(limits={"max_lateral_acceleration": 0}), "limits.max_lateral_accelera"),
         (data(limits=[]), "limits"),
+        (
+            data(limits={"lateral_acceleration_at": "center_of_gravity"}),
+            "limits.lateral_acceleration_at",  # but no load
+        ),
+        (data(limits={"lateral_acceleration_at": "cog"}), "limits.lateral_acc"),
+        (data(load={"center_of_gravity": [0, 0]}), "load.center_of_gravity[2]"),
+        (data(load={"center_of_gravity": [0, 0, 0]}), "load.center_of_gravity[2]"),
+        (data(load={"mass": 3}), "load.center_of_gravity"),
+        (loaded(mass=0), "load.mass"),
+        (loaded(tipping_factor=0.9), "load.tipping_factor"),
+        (loaded(factor=2), "load.factor"),
+        (data(load={"center_of_gravity": [0, 0.2, 1]}), "load"),  # on one line
+        (loaded([0, 0.3, 1]), "load"),  # beside the wheels
+        (loaded([0.4, 0.2, 1]), "load"),  # on a wheel
+        (data(guaranteed={"kappa_rate": -1}), "guaranteed.kappa_rate"),
+        (data(guaranteed={"beta_rate": 1}), "guaranteed.beta_rate"),
+        (data(skid_steer={}), "skid_steer.effective_track"),
+        (data(skid_steer={"effective_track": 0}), "skid_steer.effective_track"),
+        (data(skid_steer={"effective_track": 1}), "wheels"),  # steered wheels
+        (data(synchro="yes"), "synchro"),
+        (data(synchro=True, wheels=[STEERED, FIXED]), "wheels"),
         (data(kappa_g=0), "kappa_g"),
         (data(kappa_g=float("inf")), "kappa_g"),
         (data(reference_point=[0]), "reference_point"),
@@ -153,6 +193,34 @@ def test_unknown_keys_keep_their_path_whatever_their_name(key: str) -> None:
 def test_mistakes_are_reported_with_their_path(given: object, path: str) -> None:
     found = problems(given)
     assert any(where.startswith(path) for where in found), found
+
+
+def test_castors_carry_the_load() -> None:
+    assert configspace.vehicle_from_data(loaded()).load is not None
+
+
+def test_problems_of_the_load_say_what_is_wrong() -> None:
+    assert "one line" in problems(data(load={"center_of_gravity": [0, 0, 1]}))["load"]
+    assert "not inside" in problems(loaded([0, 0.3, 1]))["load"]
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong", "meant"),
+    [
+        ("load", "center_of_gravit", "center_of_gravity"),
+        ("load", "tiping_factor", "tipping_factor"),
+        ("guaranteed", "kapa_rate", "kappa_rate"),
+        ("guaranteed", "beta_rate", "beta_rate_deg"),
+        ("skid_steer", "efective_track", "effective_track"),
+    ],
+)
+def test_unknown_keys_of_parts_are_errors_with_a_hint(
+    key: str, wrong: str, meant: str
+) -> None:
+    assert (
+        f"did you mean {meant}?"
+        in problems(data(**{key: {wrong: 1}}))[f"{key}.{wrong}"]
+    )
 
 
 def test_huge_whole_numbers_are_errors() -> None:
