@@ -28,7 +28,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from configspace.support import support_edges
 from configspace.vehicle import (
     FixedWheel,
     MecanumWheel,
@@ -187,9 +186,7 @@ def tipping(vehicle: Vehicle) -> Iterator[Row]:
     p = center_of_gravity(vehicle)
     b = body_lever(vehicle, p)
     height = load.center_of_gravity[2]
-    for normal, distance in support_edges(
-        [wheel.position for wheel in vehicle.wheels], p
-    ):
+    for normal, distance in vehicle.tipping_edges:
         largest = distance * GRAVITY / (load.tipping_factor * height)
         # a · n = v_s² s κ_g Re(j z n̄) and j n̄ = conj(-j n).
         direction = cmath.phase(-1j * normal)

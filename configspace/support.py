@@ -11,7 +11,7 @@ __all__ = ["support_edges"]
 
 
 def support_edges(
-    contacts: Sequence[complex], point: complex
+    contacts: Sequence[complex], point: complex, reach: float = 0.0
 ) -> Iterator[tuple[complex, float]]:
     """Yield the edges of the convex hull of the contacts.
 
@@ -21,6 +21,8 @@ def support_edges(
         Where the wheels stand, ``x + j y``.
     point : complex, m
         The point whose distances are asked for, such as the centre of gravity.
+    reach : float, m, ≥ 0
+        How far a wheel may stand from its contact; every edge is that much nearer.
 
     Yields
     ------
@@ -45,7 +47,7 @@ def support_edges(
         ) from error
     # Qhull writes outward normals: n x + e <= 0 inside. Facets may repeat.
     for nx, ny, e in np.unique(hull.equations, axis=0):
-        distance = -e
+        distance = -e - reach
         if distance <= 0:
             raise ValueError(
                 "load: the centre of gravity is not inside the polygon of the wheel "

@@ -87,6 +87,8 @@ def random_vehicle(
 
 def _add_load(rng: np.random.Generator, data: dict[str, Any]) -> None:
     """Put a load on the vehicle, with castors where the wheels do not carry it."""
+    for wheel in data["wheels"]:
+        wheel.pop("offset", None)  # it shrinks the polygon; `rigid_body` knows nothing
     for i in range(int(rng.integers(3, 5)) if len(data["wheels"]) < 3 else 1):
         x, y = _point(rng)
         castor = {"id": f"carrier-{i}", "type": "castor", "x": x, "y": y}

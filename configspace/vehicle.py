@@ -322,8 +322,7 @@ class Vehicle(_Model):
         try:
             mobility = self.mobility
             if self.load is not None:
-                x, y, _ = self.load.center_of_gravity
-                list(support_edges([w.position for w in self.wheels], complex(x, y)))
+                self._require_support()
         except ValueError as error:
             raise PydanticCustomError(
                 "mobility", str(error).replace("{", "(")
@@ -334,6 +333,25 @@ class Vehicle(_Model):
                 "kappa_g: all wheels stand at the reference point, so the boundary "
                 "curvature must be given (1/m)",
             )
+
+    def _require_support(self) -> None:
+        """Raise ValueError if the load tips where the vehicle stands."""
+        if not self.tipping_edges:
+            raise ValueError("load: nothing supports it")
+
+    @cached_property
+    def tipping_edges(self) -> tuple[tuple[complex, float], ...]:
+        """Edges the load may tip over: inward normals, distances of its centre, m.
+
+        A wheel beside its steering axis stands somewhere around it, so its largest
+        offset is taken off every distance. Empty where no load is given.
+        """
+        if self.load is None:
+            return ()
+        x, y, _ = self.load.center_of_gravity
+        offsets = [abs(w.offset) for w in self.wheels if isinstance(w, SteeredWheel)]
+        places = [wheel.position for wheel in self.wheels]
+        return tuple(support_edges(places, complex(x, y), max(offsets, default=0.0)))
 
     @cached_property
     def contacts(self) -> tuple[complex, ...]:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from configspace import Vehicle
 from configspace.exact import LINE_TOLERANCE
 from configspace.limits import GRAVITY, center_of_gravity
-from configspace.support import support_edges
 from omniplan.chords import (
     Change,
     Chord,
@@ -132,8 +131,7 @@ class BodyRows:
         height = load.center_of_gravity[2]
         grow = np.maximum(part.scale_high, 1e-300) ** 2
         known = part.scale_high == 1
-        places = [wheel.position for wheel in self._vehicle.wheels]
-        for normal, distance in support_edges(places, point):
+        for normal, distance in self._vehicle.tipping_edges:
             limit = distance * GRAVITY / (load.tipping_factor * height)
             towards = [(a * normal.conjugate()).real for a in ends]
             low = np.maximum(np.maximum(*towards), 0.0)

@@ -4,9 +4,10 @@ import pytest
 
 from configspace import kernels
 from configspace.build import _load_table, _sector_table
-from configspace.exact import active_rows
+from configspace.exact import active_rows, turning_excess
 from configspace.grid import Grid, edges_of
-from configspace.limits import LoadRow, Reason, rows_of
+from configspace.limits import LoadRow, Reason, SectorRow, rows_of
+from configspace.omni_curve import components
 from configspace.testing import ALL_KINDS, VehicleKind, random_vehicle
 from configspace.vehicle import Vehicle
 
@@ -162,6 +163,31 @@ def test_parts_agree_with_the_state(kind: VehicleKind) -> None:
         assert ((wheel >= -1) & (wheel < len(vehicle.wheels))).all()
         blocks = Reason.STEER_RANGE | Reason.SINGULAR
         assert ((reason & blocks != 0) == (state != kernels.FREE)).all()
+
+
+def test_free_cells_keep_clear_of_the_singular_zone() -> None:
+    rng = np.random.default_rng(5)
+    place = np.linspace(0, 1, 9)
+    seen = np.zeros(3, int)
+    for _ in range(150):
+        b = complex(*rng.normal(size=2))
+        shares = rng.uniform(0, 1.2, 2) * rng.permutation(
+            np.array([1, int(rng.integers(2))])
+        )
+        row = SectorRow(b, 0.0, np.inf, 0, *(float(share) for share in shares))
+        grid = Grid(4 * int(rng.integers(1, 8)), int(rng.integers(8, 40)))
+        kappa, beta = grid.kappa_edges, grid.beta_edges
+        load = _load_table([LoadRow(Reason.SPEED, "disc", 1.0, 1j)])
+        state = kernels.cell_tables(kappa, beta, load, _sector_table([row]))[4]
+        k = kappa[:-1, None] + place * np.diff(kappa)[:, None]
+        m = beta[:-1, None] + place * np.diff(beta)[:, None]
+        c, s = components(k[:, None, :, None])
+        e = np.exp(1j * m[None, :, None, :])
+        excess = turning_excess(row, c, s, e)
+        assert (excess.max(axis=(2, 3))[state == kernels.FREE] <= 1e-12).all()
+        assert (excess.min(axis=(2, 3))[state == kernels.BLOCKED] >= -1e-12).all()
+        seen += np.bincount(state.ravel(), minlength=3)
+    assert (seen > 1000).all()
 
 
 def test_blocks_cover_all_cells_and_are_small() -> None:

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+import configspace
 from configspace.support import support_edges
 
 SQUARE = [1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j]
@@ -64,3 +65,22 @@ def test_a_polygon_far_from_the_origin_is_the_same() -> None:
         assert abs(match - normal) < 1e-13
         assert distance == pytest.approx(near[match], abs=1e-12)
     assert math.isclose(sum(near.values()), sum(away.values()), abs_tol=1e-12)
+
+
+def test_a_wheel_beside_its_axis_makes_every_edge_nearer() -> None:
+    def vehicle(offset: float, y: float) -> configspace.Vehicle:
+        wheels = [
+            {"id": f"{a}{b}", "type": "steered", "x": a, "y": b, "max_speed": 1}
+            | {"offset": offset}
+            for a in (0.5, -0.5)
+            for b in (0.5, -0.5)
+        ]
+        load = {"center_of_gravity": [0, y, 0.5]}
+        data = {"name": "v", "wheels": wheels, "load": load}
+        return configspace.vehicle_from_data(data)
+
+    plain, beside = vehicle(0.0, 0.0), vehicle(-0.1, 0.0)
+    assert sorted(d for _, d in plain.tipping_edges) == pytest.approx([0.5] * 4)
+    assert sorted(d for _, d in beside.tipping_edges) == pytest.approx([0.4] * 4)
+    with pytest.raises(configspace.InvalidVehicle, match="centre of gravity"):
+        vehicle(0.3, -0.3)
