@@ -53,7 +53,7 @@ def test_bad_input_is_reported_with_code_words_and_place(
 
 
 @pytest.mark.parametrize(
-    "error", [CacheError("/root/x"), OSError("/root"), KeyError(1)]
+    "error", [CacheError("/srv/secret"), OSError("/srv"), KeyError(1)]
 )
 def test_any_other_error_shows_nothing(error: Exception) -> None:
     reply = error_reply(error)
