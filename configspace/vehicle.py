@@ -320,9 +320,8 @@ class Vehicle(_Model):
 
     def _mobility_and_curvature(self) -> None:
         try:
-            mobility = self.mobility
-            if self.load is not None:
-                self._require_support()
+            # Both raise ValueError where the wheels or the load do not fit.
+            mobility, _ = self.mobility, self.tipping_edges
         except ValueError as error:
             raise PydanticCustomError(
                 "mobility", str(error).replace("{", "(")
@@ -333,11 +332,6 @@ class Vehicle(_Model):
                 "kappa_g: all wheels stand at the reference point, so the boundary "
                 "curvature must be given (1/m)",
             )
-
-    def _require_support(self) -> None:
-        """Raise ValueError if the load tips where the vehicle stands."""
-        if not self.tipping_edges:
-            raise ValueError("load: nothing supports it")
 
     @cached_property
     def tipping_edges(self) -> tuple[tuple[complex, float], ...]:
