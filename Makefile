@@ -21,6 +21,10 @@ $(VENV)/.dev: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
+$(VENV)/.bench: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
+	@touch $@
+
 setup: $(VENV)/.dev ## make the virtual environment with all tools
 
 demo: $(VENV)/.run ## judge a mixed fleet over zenoh; pictures in demo-output/
@@ -56,7 +60,7 @@ examples: $(VENV)/.dev ## run every example
 	  echo "$$example"; $(BIN)/python -W error $$example > /dev/null || exit 1; done
 	@git diff --exit-code --stat -- examples/manoeuvres
 
-bench: $(VENV)/.dev ## measure; see benchmarks/README.md
+bench: $(VENV)/.bench ## measure; see benchmarks/README.md
 	$(BIN)/python -m pytest benchmarks -o python_files="bench_*.py" --benchmark-only
 
 docs: $(VENV)/.dev ## draw the figures of docs/
