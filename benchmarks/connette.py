@@ -164,7 +164,7 @@ def main() -> None:
             f"{run.max_steering_rate:.2f}",
             f"{run.max_steering_error:.1e}",
         )
-    Console().print(table)
+    Console(width=132).print(table)
 
 
 if __name__ == "__main__":
