@@ -8,7 +8,9 @@ import logging
 
 from configspace.build import build_space
 from configspace.classification import Classification, classify
+from configspace.clearance import ClearanceMap, clearance_map, path_clearance
 from configspace.constraints import steering_residual
+from configspace.drives import DriveContact, DriveSpeeds, drive_contacts, drive_speeds
 from configspace.equivalence import cross_pole, equivalent, representations
 from configspace.errors import (
     CacheError,
@@ -18,16 +20,31 @@ from configspace.errors import (
     Problem,
 )
 from configspace.exact import exact_reason, exact_v_max
-from configspace.forward import twist_from_pair, twist_from_wheels
+from configspace.forward import (
+    twist_from_drives,
+    twist_from_pair,
+    twist_from_wheels,
+)
 from configspace.gradients import wheel_gradients
 from configspace.grid import Grid
 from configspace.kinematics import wheel_directions, wheel_states
 from configspace.limits import Reason
+from configspace.manoeuvrability import (
+    ManoeuvrabilityIndex,
+    dexterity,
+    manoeuvrability_index,
+)
 from configspace.omni_curve import from_twist, to_twist
 from configspace.rates import RatePolytope, rate_polytope
 from configspace.rotation_centre import SingularPoint, icr, icr_of, singular_points
 from configspace.space import PermissibleSpace
-from configspace.spherical import from_spherical, to_spherical
+from configspace.spherical import (
+    angular_distance,
+    energy_length,
+    from_spherical,
+    sphere_point,
+    to_spherical,
+)
 from configspace.storage import dump_space, load_space, parse_space
 from configspace.vehicle import Vehicle
 from configspace.vehicle_io import (
@@ -41,9 +58,13 @@ from configspace.vehicle_io import (
 __all__ = [
     "CacheError",
     "Classification",
+    "ClearanceMap",
+    "DriveContact",
+    "DriveSpeeds",
     "Grid",
     "InvalidInput",
     "InvalidVehicle",
+    "ManoeuvrabilityIndex",
     "OmniplanError",
     "PermissibleSpace",
     "Problem",
@@ -51,11 +72,17 @@ __all__ = [
     "Reason",
     "SingularPoint",
     "Vehicle",
+    "angular_distance",
     "build_space",
     "catalog",
     "classify",
+    "clearance_map",
     "cross_pole",
+    "dexterity",
+    "drive_contacts",
+    "drive_speeds",
     "dump_space",
+    "energy_length",
     "equivalent",
     "exact_reason",
     "exact_v_max",
@@ -65,14 +92,18 @@ __all__ = [
     "icr_of",
     "load_space",
     "load_vehicle",
+    "manoeuvrability_index",
     "parse_space",
     "parse_vehicle",
+    "path_clearance",
     "rate_polytope",
     "representations",
     "singular_points",
+    "sphere_point",
     "steering_residual",
     "to_spherical",
     "to_twist",
+    "twist_from_drives",
     "twist_from_pair",
     "twist_from_wheels",
     "vehicle_from_data",

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,18 +14,21 @@ import numpy.typing as npt
 from configspace import cache as space_cache
 from configspace import kernels
 from configspace.errors import InvalidVehicle, Problem
-from configspace.exact import active_rows, largest_load
+from configspace.exact import active_rows
 from configspace.grid import Grid, edges_of
 from configspace.limits import LoadRow, SectorRow, rows_of
 from configspace.omni_curve import components
 from configspace.rate_cells import build_cell_rates
+from configspace.rounding import round_tables
 from configspace.sheet import SheetHeader, Tables
 from configspace.space import PermissibleSpace
+from configspace.unlimited import is_unlimited
 from configspace.vehicle import Vehicle
 
 __all__ = ["build_space"]
 
 FloatArray = npt.NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 _KINDS = {"disc": 0, "strip": 1, "offset": 2, "lateral": 3, "edge": 4}
 
 
@@ -81,20 +85,25 @@ def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:
         directions.append(active_rows(loads, True))
     layers = [_layer(vehicle, rows, sectors, kappa, beta) for rows in directions]
     tables = Tables(
-        load=np.stack([layer.load for layer in layers]),
-        v_lo=np.stack([layer.v_lo for layer in layers]),
-        v_hi=np.stack([layer.v_hi for layer in layers]),
+        load=_stacked([layer.load for layer in layers]),
+        v_lo=_stacked([layer.v_lo for layer in layers]),
+        v_hi=_stacked([layer.v_hi for layer in layers]),
         # Steering does not depend on the driving direction.
         state=layers[0].state,
         parts=layers[0].parts,
-        reason=np.stack([layer.reason for layer in layers]),
-        wheel=np.stack([layer.wheel for layer in layers]),
+        reason=_stacked([layer.reason for layer in layers]),
+        wheel=_stacked([layer.wheel for layer in layers]),
     )
     header = SheetHeader.of(vehicle, grid)
     # Change rates vary slowly enough for a grid of a quarter of the cells each way.
     coarse = Grid(max(grid.n_kappa // 16 * 4, 4), max(grid.n_beta // 4, 8))
     rates = build_cell_rates(vehicle, coarse)
     return PermissibleSpace(header=header, tables=tables, rates=rates, vehicle=vehicle)
+
+
+def _stacked(layers: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:
+    """Return arrays along a new first axis; one alone is not copied."""
+    return layers[0][None] if len(layers) == 1 else np.stack(layers)
 
 
 def _layer(
@@ -108,20 +117,15 @@ def _layer(
     nodes, cell_pad, low, high, state, parts, reason, wheel = kernels.cell_tables(
         kappa, beta, _load_table(rows), _sector_table(sectors)
     )
-    suspects = np.argwhere((state == kernels.FREE) & (low < 1e-12))
-    if not rows or _is_unlimited(rows, suspects, kappa, beta):
+    edges = (kappa, beta)
+    if is_unlimited(vehicle, rows, sectors, edges, low, state):
         raise _unlimited(vehicle)
-    nodes += _pad(rows, kappa, float(beta[1] - beta[0]))[:, None]
-    nodes += _at_nodes(cell_pad)
-    with np.errstate(divide="ignore"):
-        slowest = np.where(state == kernels.FREE, 1 / np.sqrt(high), 0.0)
-        fastest = np.where(state == kernels.BLOCKED, 0.0, 1 / np.sqrt(low))
+    row_pad = _pad(rows, kappa, float(beta[1] - beta[0]))
+    load, v_lo, v_hi = round_tables(nodes, row_pad, cell_pad, low, high, state)
     return Tables(
-        # Never 0: a load that vanishes at a singular point is not a speed limit.
-        load=_rounded_up(np.maximum(nodes * (1 + 1e-14), 1e-30)),
-        v_lo=-_rounded_up(-slowest * (1 - 1e-14)),
-        # A cell around a wheel's singular point may have no bound on its speed.
-        v_hi=_rounded_up(np.minimum(fastest * (1 + 1e-14), 3e38)),
+        load=load,
+        v_lo=v_lo,
+        v_hi=v_hi,
         state=state,
         parts=parts,
         reason=reason,
@@ -158,6 +162,7 @@ def _sector_table(rows: Sequence[SectorRow]) -> tuple[npt.NDArray[np.generic], .
         np.array([row.half <= math.pi / 2 for row in rows], dtype=bool),
         np.array([row.kappa_share for row in rows], dtype=np.float64),
         np.array([row.beta_share for row in rows], dtype=np.float64),
+        np.array([row.kappa_share * row.pole_arm for row in rows], dtype=np.float64),
         np.array([row.wheel for row in rows], dtype=np.int16),
     )
 
@@ -193,41 +198,6 @@ def _pad(rows: Sequence[LoadRow], kappa: FloatArray, width: float) -> FloatArray
     return np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
 
 
-def _at_nodes(pad: FloatArray) -> FloatArray:
-    """Return for every node the largest of the cells that meet there."""
-    around = np.pad(pad, 1)
-    return np.maximum(
-        np.maximum(around[:-1, :-1], around[:-1, 1:]),
-        np.maximum(around[1:, :-1], around[1:, 1:]),
-    )
-
-
-def _is_unlimited(
-    rows: Sequence[LoadRow],
-    suspects: npt.NDArray[np.int64],
-    kappa: FloatArray,
-    beta: FloatArray,
-) -> bool:
-    """Return whether some suspected cell holds a point that no limit bounds.
-
-    A cell's least load is bounded by the largest of its rows' least values, which may
-    be 0 though no point of the cell is free of load. So suspects are searched; what
-    the step of the search cannot tell from no limit counts as none.
-    """
-    steps = np.linspace(0, 1, 65)
-    for k, m in suspects:
-        at_kappa = kappa[k] + steps * (kappa[k + 1] - kappa[k])
-        at_beta = beta[m] + steps * (beta[m + 1] - beta[m])
-        c, s = (x[:, None] for x in components(at_kappa))
-        load = largest_load(rows, c, s, np.exp(1j * at_beta)[None, :])
-        step = (kappa[k + 1] - kappa[k] + beta[m + 1] - beta[m]) / 128
-        # What changes as fast as a disc or strip does; the others do not bound alone.
-        steepest = max(row.p + abs(row.b) for row in rows)
-        if load.min() <= (steepest * step) ** 2:
-            return True
-    return False
-
-
 def _unlimited(vehicle: Vehicle) -> InvalidVehicle:
     return InvalidVehicle(
         Problem(
@@ -237,14 +207,4 @@ def _unlimited(vehicle: Vehicle) -> InvalidVehicle:
             "limits.max_yaw_rate_deg",
         ),
         subject=f"vehicle {vehicle.name}",
-    )
-
-
-def _rounded_up(values: FloatArray) -> npt.NDArray[np.float32]:
-    """Return `values` as float32, never smaller."""
-    single = values.astype(np.float32)
-    return np.where(
-        single.astype(np.float64) < values,
-        np.nextafter(single, np.float32(np.inf)),
-        single,
     )

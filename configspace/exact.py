@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Sequence
 
@@ -11,7 +10,13 @@ import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.limits import LoadRow, Reason, SectorRow, rows_of
-from configspace.omni_curve import components, finite, nominal_curvature, together
+from configspace.omni_curve import (
+    POLE,
+    components,
+    finite,
+    nominal_curvature,
+    together,
+)
 from configspace.vehicle import Vehicle
 
 __all__ = ["exact_reason", "exact_v_max"]
@@ -150,6 +155,17 @@ def largest_load(
     return worst
 
 
+def is_blocked(
+    vehicle: Vehicle,
+    sectors: Sequence[SectorRow],
+    c: FloatArray,
+    s: FloatArray,
+    e: npt.NDArray[np.complex128],
+) -> BoolArray:
+    """Return whether configurations are blocked at any speed."""
+    return _blocked(vehicle, sectors, c, s, e)[0]
+
+
 def _blocked(
     vehicle: Vehicle,
     sectors: Sequence[SectorRow],
@@ -162,10 +178,9 @@ def _blocked(
     who = np.full(c.shape, -1, np.int16)
     line = vehicle.mobility.line_beta
     if line is not None:
+        # A pole is one configuration, whatever β.
         off = (np.abs(wrap(np.angle(e) - line)) > LINE_TOLERANCE) & (c > 0)
         why = np.where(off, np.uint16(Reason.FIXED_WHEEL), why)
-        # A pole is one configuration, and left along the line.
-        e = np.where(c > 0, e, cmath.exp(1j * line))
     if vehicle.mobility.is_translating:
         turns = np.abs(s) > LINE_TOLERANCE
         why = np.where(turns, np.uint16(Reason.PARALLEL_WHEELS), why)
@@ -185,12 +200,15 @@ def turning_excess(
     """Return by how much the guaranteed rates exceed the steering rate; ≤ 0 within.
 
     ``|∂α/∂κ_n| κ̇ + |∂α/∂β| β̇ ≤ α̇_max`` with ``∂α/∂κ_n = g / |z|²`` and
-    ``∂α/∂β = c (c + s f) / |z|²``, multiplied by |z|² (spec/omni-curve §4).
+    ``∂α/∂β = c (c + s f) / |z|²``, multiplied by |z|² (spec/omni-curve §4). At a pole
+    all β are one configuration: the worst of them counts, see `SectorRow.pole_arm`.
     """
     z = c * e + s * row.b
     across, along = np.abs((e * row.b.conjugate()).imag), (e * row.b.conjugate()).real
+    across = np.where(c > POLE, across, row.pole_arm)
     asked = row.kappa_share * across + row.beta_share * np.abs(c * (c + s * along))
-    return np.asarray(asked - (z.real**2 + z.imag**2) - 1e-14)
+    # Within rounding is within the rate, but next to z = 0 the rounding is of |z|² too.
+    return np.asarray(asked - (z.real**2 + z.imag**2) * (1 + 1e-14))
 
 
 def steering_excess(row: SectorRow, z: npt.NDArray[np.complex128]) -> FloatArray:

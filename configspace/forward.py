@@ -2,9 +2,9 @@
 
 Every wheel says up to two things about the twist: its rolling speed and, if it is a
 standard wheel, that it does not slip along its axle (`configspace.constraints`). With
-a lateral axle offset D the first reads ``(row - (0, 0, D)) · t = u + D dα/dt``. As a
-rule that is more than three equations: the twist is their least squares solution, and
-what remains tells slip, faults and wrong geometry.
+a lateral axle offset D the first reads ``(row - (0, 0, D)) · t = û + D dα/dt``, with û
+as in `configspace.drives`. As a rule that is more than three equations: the twist is
+their least squares solution, and what remains tells slip, faults and wrong geometry.
 
 References
 ----------
@@ -14,10 +14,13 @@ Connette 2013, Eq. (3.87), (3.88), (B.10); lecture, section 3.2
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
-from configspace.constraints import is_kind, is_standard, measured, wheel_rows
+from configspace.constraints import is_standard, measured, wheel_rows
+from configspace.drives import drive_contacts
 from configspace.errors import InvalidInput, Problem
 from configspace.omni_curve import finite, together
 from configspace.vehicle import (
@@ -28,7 +31,7 @@ from configspace.vehicle import (
     Vehicle,
 )
 
-__all__ = ["twist_from_pair", "twist_from_wheels"]
+__all__ = ["twist_from_drives", "twist_from_pair", "twist_from_wheels"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -94,22 +97,88 @@ def twist_from_wheels(
         alpha=angle, u=speed, alpha_dot=rate, weights=trust
     )
     offset = _offsets(vehicle) if alpha_dot is not None else np.zeros(count)
-    rolling, no_slip = wheel_rows(vehicle, angle)
-    rolling[..., 2] -= offset
-    right = speed + np.where(offset != 0, offset * rate, 0.0)
-    slips_not = is_standard(vehicle) & ~np.isnan(no_slip[..., 0])
-    known = ~np.isnan(rolling[..., 0]) & ~np.isnan(right) & ~is_kind(vehicle, Castor)
-    share = np.concatenate([trust * known, trust * slips_not], axis=-1)
-    right = np.concatenate([right, np.zeros_like(right)], axis=-1)
-    matrix = np.concatenate([rolling, no_slip], axis=-2)
-    used = share > 0
-    root = np.sqrt(np.where(used, share, 0.0))
-    matrix = np.where(used[..., None], matrix, 0.0)
-    right = np.where(used, right, 0.0)
-    twist = _least_squares(vehicle, matrix * root[..., None], right * root)
-    lacking = (matrix @ twist[..., None])[..., 0] - right
-    mean_square = (share * lacking**2).sum(axis=-1) / share.sum(axis=-1)
-    return twist, np.sqrt(mean_square)
+    rolls = [i for i, w in enumerate(vehicle.wheels) if not isinstance(w, Castor)]
+    measured_by = _Measured([vehicle.wheels[i].id for i in rolls], rolls, offset[rolls])
+    return _fit(vehicle, measured_by, angle, speed[..., rolls], rate, trust)
+
+
+def twist_from_drives(
+    vehicle: Vehicle,
+    alpha: npt.ArrayLike,
+    rolling: npt.ArrayLike,
+    alpha_dot: npt.ArrayLike,
+    *,
+    weights: npt.ArrayLike | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the twist that fits the speeds of the drives best: odometry, telemetry.
+
+    The way back of `drive_speeds`. Unlike `twist_from_wheels` it reads both wheels of a
+    turntable, whose difference tells ω + α̇.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        With n wheels and m driven contacts.
+    alpha : (..., n) float, rad
+        Steering angles; read for wheels that steer only; NaN where not measured.
+    rolling : (..., m) float, m/s
+        Rolling speeds û of the contacts, in the order of `drive_contacts`; NaN where
+        not measured.
+    alpha_dot : (..., n) float, rad/s
+        Steering rates; read for wheels that roll beside their axis. NaN where not
+        measured, which leaves the speeds of such wheels out.
+    weights : (..., n) float, 1, ≥ 0, optional
+        Trust in each wheel, inverse to the variance; default 1.
+
+    Returns
+    -------
+    twist : (..., 3) float, m/s, m/s, rad/s
+        (vx, vy, omega) of K in the vehicle frame.
+    residual : (...,) float, m/s, ≥ 0
+        Root of the (weighted) mean square of what the rows lack.
+
+    Raises
+    ------
+    InvalidInput
+        As `twist_from_wheels`; also if the last axis of `rolling` is not m.
+
+    References
+    ----------
+    Connette 2013, Eq. (B.10); spec/steered-wheels §1.5, §2.11.
+
+    Examples
+    --------
+    >>> from configspace import drive_speeds, load_vehicle, wheel_states
+    >>> agv = load_vehicle("two-turntables")
+    >>> alpha, _ = wheel_states(agv, 0.5, 0.2, 0.4)
+    >>> speeds = drive_speeds(agv, 0.5, 0.2, 0.4, kappa_n_dot=0.3)
+    >>> twist, residual = twist_from_drives(
+    ...     agv, alpha, speeds.rolling, speeds.alpha_dot)
+    >>> bool(residual < 1e-12)
+    True
+    """
+    contacts = drive_contacts(vehicle)
+    of = [contact.wheel for contact in contacts]
+    count = len(vehicle.wheels)
+    angle, trust = measured("alpha", alpha, count), _weights(weights, count)
+    rate = measured("alpha_dot", alpha_dot, count)
+    speed = measured("rolling", rolling, len(contacts))
+    shape = together(
+        alpha=angle[..., 0],
+        rolling=speed[..., :1].sum(axis=-1),
+        alpha_dot=rate[..., 0],
+        weights=trust[..., 0],
+    )[0].shape
+    angle, rate, trust = (
+        np.broadcast_to(x, (*shape, count)) for x in (angle, rate, trust)
+    )
+    speed = np.broadcast_to(speed, (*shape, len(contacts)))
+    measured_by = _Measured(
+        [contact.name for contact in contacts],
+        of,
+        np.array([contact.offset for contact in contacts]),
+    )
+    return _fit(vehicle, measured_by, angle, speed, rate, trust)
 
 
 def twist_from_pair(
@@ -175,32 +244,63 @@ def twist_from_pair(
     return np.stack([v.real, v.imag, omega], axis=-1)
 
 
+class _Measured(NamedTuple):
+    """What has a rolling speed: m contacts, with their wheels and lateral offsets."""
+
+    names: list[str]
+    wheels: list[int]
+    offset: FloatArray
+
+
+def _fit(
+    vehicle: Vehicle,
+    by: _Measured,
+    angle: FloatArray,
+    speed: FloatArray,
+    rate: FloatArray,
+    trust: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least squares twist and residual; `speed` (..., m), the rest of n."""
+    all_rolling, no_slip = wheel_rows(vehicle, angle)
+    rolling = all_rolling[..., by.wheels, :]
+    rolling[..., 2] -= by.offset
+    right = speed + np.where(by.offset != 0, by.offset * rate[..., by.wheels], 0.0)
+    slips_not = is_standard(vehicle) & ~np.isnan(no_slip[..., 0])
+    known = ~np.isnan(rolling[..., 0]) & ~np.isnan(right)
+    share = np.concatenate([trust[..., by.wheels] * known, trust * slips_not], axis=-1)
+    right = np.concatenate([right, np.zeros(no_slip.shape[:-1])], axis=-1)
+    matrix = np.concatenate([rolling, no_slip], axis=-2)
+    used = share > 0
+    root = np.sqrt(np.where(used, share, 0.0))
+    matrix = np.where(used[..., None], matrix, 0.0)
+    right = np.where(used, right, 0.0)
+    twist = _least_squares(vehicle, by.names, matrix * root[..., None], right * root)
+    lacking = (matrix @ twist[..., None])[..., 0] - right
+    mean_square = (share * lacking**2).sum(axis=-1) / share.sum(axis=-1)
+    return twist, np.sqrt(mean_square)
+
+
 def _least_squares(
-    vehicle: Vehicle, matrix: FloatArray, right: FloatArray
+    vehicle: Vehicle, names: list[str], matrix: FloatArray, right: FloatArray
 ) -> FloatArray:
     """Return the twists, or raise naming the wheels of the first that is not known."""
     scale = np.array([1.0, 1.0, vehicle.boundary_curvature])
     left, values, axes = np.linalg.svd(matrix * scale, full_matrices=False)
     rank = (values > _RANK_TOLERANCE * values[..., :1]).sum(axis=-1)
     if (rank < 3).any():
-        _raise_unknown(vehicle, rank, matrix)
+        _raise_unknown(names, rank, matrix)
     along = (left.swapaxes(-1, -2) @ right[..., None]) / values[..., None]
     twist: FloatArray = (axes.swapaxes(-1, -2) @ along)[..., 0] * scale
     return twist
 
 
 def _raise_unknown(
-    vehicle: Vehicle, rank: npt.NDArray[np.int_], matrix: FloatArray
+    names: list[str], rank: npt.NDArray[np.int_], matrix: FloatArray
 ) -> None:
     first = tuple(map(int, np.argwhere(rank < 3)[0]))
-    count = len(vehicle.wheels)
-    says = (matrix[first] != 0).any(axis=-1)
-    read = [w.id for w, r in zip(vehicle.wheels, says[:count], strict=True) if r]
-    missing = [
-        w.id
-        for w, r in zip(vehicle.wheels, says[:count], strict=True)
-        if not r and not isinstance(w, Castor)
-    ]
+    says = (matrix[first] != 0).any(axis=-1)[: len(names)]
+    read = [name for name, r in zip(names, says, strict=True) if r]
+    missing = [name for name, r in zip(names, says, strict=True) if not r]
     where = f"u[{', '.join(map(str, first))}]" if first else "u"
     given = f"rolling speeds of {', '.join(read) or 'no wheel'}"
     without = f" (not of {', '.join(missing)})" if missing else ""

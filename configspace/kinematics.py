@@ -67,7 +67,8 @@ def wheel_states(
         wheels that do not steer, NaN for castors. At a wheel's singular point
         (z_i = 0) the angle is undefined and 0 is returned.
     u : (..., n) float, m/s
-        Rolling speed; NaN for castors.
+        Rolling speed at the steering axis; NaN for castors. `drive_speeds` tells what
+        wheels beside their axis and shared motors do.
 
     Raises
     ------

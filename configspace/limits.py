@@ -108,6 +108,20 @@ class SectorRow:
     """Guaranteed dκ_n/dt per largest steering rate, 1/rad."""
     beta_share: float = 0.0
     """Guaranteed dβ/dt per largest steering rate, 1."""
+    line: float | None = None
+    """The constant β of a line-mobile vehicle, rad."""
+
+    @property
+    def pole_arm(self) -> float:
+        """Largest ``|∂α/∂κ_n| |z|²`` at κ_n = ±2, 1.
+
+        All β are one configuration there and the motion may leave it with any of them,
+        so what is asked is the worst over β: ``|b|`` for ``|Im(e^{jβ} b̄)|``. A
+        line-mobile vehicle leaves along its line.
+        """
+        if self.line is None:
+            return abs(self.b)
+        return abs((cmath.exp(1j * self.line) * self.b.conjugate()).imag)
 
 
 Row: TypeAlias = LoadRow | SectorRow
@@ -199,7 +213,11 @@ def steering(vehicle: Vehicle) -> Iterator[Row]:
 
     A finite range of more than a full turn is used as the full turn in its middle:
     then the direction alone decides. The singular zone is where some wheel would have
-    to steer faster than it can to follow the guaranteed rates of κ_n and β.
+    to steer faster than it can to follow the guaranteed rates of κ_n and β. The rates
+    are guaranteed from standstill (v_s → 0): what a wheel beside its axis or with
+    shared motors can steer then is `SteerableWheel.standing_steering_rate`, as in
+    `configspace.rates.rate_limits` for v_n = 0. While it rolls it can steer less; the
+    guarantee does not say by how much the vehicle must slow down for its rates.
     """
     for i, wheel in enumerate(vehicle.wheels):
         if not isinstance(wheel, SteerableWheel):
@@ -209,11 +227,19 @@ def steering(vehicle: Vehicle) -> Iterator[Row]:
         if math.isfinite(largest):
             middle, half = (largest + least) / 2, min((largest - least) / 2, math.pi)
         kappa_share = beta_share = 0.0
-        if vehicle.guaranteed and wheel.max_steering_rate_deg:
-            rate = math.radians(wheel.max_steering_rate_deg)
+        if vehicle.guaranteed:
+            rate = wheel.standing_steering_rate
             kappa_share = vehicle.guaranteed.kappa_rate / rate
             beta_share = math.radians(vehicle.guaranteed.beta_rate_deg) / rate
-        yield SectorRow(lever(vehicle, i), middle, half, i, kappa_share, beta_share)
+        yield SectorRow(
+            lever(vehicle, i),
+            middle,
+            half,
+            i,
+            kappa_share,
+            beta_share,
+            vehicle.mobility.line_beta,
+        )
 
 
 LIMITS: tuple[Callable[[Vehicle], Iterator[Row]], ...] = (

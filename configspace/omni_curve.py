@@ -22,6 +22,9 @@ __all__ = ["components", "from_twist", "to_twist"]
 
 FloatArray = npt.NDArray[np.float64]
 
+POLE = 1e-12
+"""c up to which a configuration counts as a pole, where β has no meaning: rounding."""
+
 
 def finite(name: str, values: npt.ArrayLike, unit: str) -> FloatArray:
     """Return `values` as a float array, or raise `InvalidInput` naming `name`."""

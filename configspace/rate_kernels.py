@@ -2,7 +2,7 @@
 
 Notation of spec/omni-curve §4 with ``b = j κ_g w``, ``e = e^{jβ}``: ``f = Re(e b̄)``,
 ``g = -Im(e b̄)``, ``Q = |z|²``. Extremes of numerators and of Q are exact up to
-rounding, which `_GUARD` covers.
+rounding, which `GUARD` covers.
 """
 # mypy: disallow-untyped-decorators = False
 
@@ -12,15 +12,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
-from configspace.kernels import _cos_range, _disc_range, _functional_range
+from configspace.bounds import GUARD, cos_range, disc_range, functional_range
 
 __all__ = ["fill_bounds"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
-
-_GUARD = 1e-12
 
 
 @njit(cache=True, inline="always")
@@ -54,12 +52,12 @@ def _turn_with_beta(
         vertex = -s0 * f / 2
         if min(c0, c1) < vertex < c_max:
             largest = max(largest, vertex * vertex)
-    by_terms = (largest + _GUARD * c_max * (c_max + size)) / q
+    by_terms = (largest + GUARD * c_max * (c_max + size)) / q
     d0, d1 = c0 * c0 - (s0 * size) ** 2, c1 * c1 - (s1 * size) ** 2
     least, most = min(d0, d1), max(d0, d1)
     bottom = least / (q_max if least > 0 else q)
     top = most / (q if most > 0 else q_max)
-    once = (_peak(1 + bottom, 1 + top) + _GUARD * (1 + _peak(bottom, top))) / 2
+    once = (_peak(1 + bottom, 1 + top) + GUARD * (1 + _peak(bottom, top))) / 2
     smallest: float = min(by_terms, once, c_max / math.sqrt(q))
     return smallest
 
@@ -80,9 +78,9 @@ def _slope(
         f0, f1 = min(s0 * low, s0 * high), max(s0 * low, s0 * high)
         peak = _peak(min(c0, c1) + f0, max(c0, c1) + f1)
     else:  # f + s |b|²
-        bottom, top = _functional_range(1.0, s0, 1.0, s1, low, high, size * size)
+        bottom, top = functional_range(1.0, s0, 1.0, s1, low, high, size * size)
         peak = _peak(bottom, top)
-    slope: float = peak + _GUARD * (1 + size) * (1 + size)
+    slope: float = peak + GUARD * (1 + size) * (1 + size)
     return slope
 
 
@@ -104,13 +102,13 @@ def _steered(
     gradients are infinite where the least |z| is 0.
     """
     size = abs(b)
-    low, high = _cos_range(e0, e1, b)  # f = Re(e^{jβ} b̄)
-    g_low, g_high = _cos_range(e0, e1, -1j * b)
-    q, largest = _disc_range(c0, s0, c1, s1, 1.0, size * size, low, high)
+    low, high = cos_range(e0, e1, b)  # f = Re(e^{jβ} b̄)
+    g_low, g_high = cos_range(e0, e1, -1j * b)
+    q, largest = disc_range(c0, s0, c1, s1, 1.0, size * size, low, high)
     if q <= 0.0:
         return np.inf, np.inf, np.inf, np.inf, 0.0, math.sqrt(largest)
     z, c_max = math.sqrt(q), max(c0, c1)
-    g = _peak(g_low, g_high) + _GUARD * size
+    g = _peak(g_low, g_high) + GUARD * size
     turn = _turn_with_beta(c0, s0, c1, s1, low, high, size, q, largest)
     lever, other = (1.0, size) if outer else (size, 1.0)  # |∂z/∂κ_n| here and beyond
     speed = min(lever, _slope(outer, c0, s0, c1, s1, low, high, size) / z)
@@ -143,20 +141,20 @@ def _unsteered(
 ) -> tuple[float, float, float]:
     """Largest |∂r/∂κ_n|, |∂r/∂β| and |r| over a cell, ``r = Re(z n̄)``."""
     h = b.real * n.real + b.imag * n.imag
-    low, high = _cos_range(e0, e1, n)
-    side_low, side_high = _cos_range(e0, e1, -1j * n)
-    guard = _GUARD * abs(n) * (1 + abs(b))
+    low, high = cos_range(e0, e1, n)
+    side_low, side_high = cos_range(e0, e1, -1j * n)
+    guard = GUARD * abs(n) * (1 + abs(b))
     with_kappa = 0.0
     if outer or kink != 0.0:
         with_kappa = _peak(low, high)
     if not outer or kink != 0.0:
         with_kappa = max(with_kappa, abs(h))
-    bottom, top = _functional_range(c0, s0, c1, s1, low, high, h)
+    bottom, top = functional_range(c0, s0, c1, s1, low, high, h)
     with_beta = max(c0, c1) * _peak(side_low, side_high)
     return with_kappa + guard, with_beta + guard, _peak(bottom, top) + guard
 
 
-@njit(cache=True)
+@njit(cache=True, parallel=True)
 def fill_bounds(
     c: Array,
     s: Array,
@@ -186,8 +184,9 @@ def fill_bounds(
         Written to: steer, accel of κ_n and β, v_s_dot, load, headroom of κ_n and β.
     """
     b, n, rate, accel, max_speed, per_rate, offset_low, offset_high = wheels
-    turns, loads = np.empty((2, b.size)), np.empty(b.size)
-    for k in range(c.size - 1):
+    rolls = np.flatnonzero((per_rate > 0.0) & (max_speed < np.inf))
+    for k in prange(c.size - 1):
+        turns, loads = np.empty((2, b.size)), np.zeros(b.size)
         c0, s0, c1, s1 = c[k], s[k], c[k + 1], s[k + 1]
         outer = c0 != c1
         kink = 0.0
@@ -199,7 +198,6 @@ def fill_bounds(
             if outer or kink != 0.0:
                 cell[2] = vehicle_accel
             cell[4] = vehicle_accel / max(c0, c1)
-            loads[:] = -1.0  # wheels that cost no rolling as they steer
             for i in range(b.size):
                 if n[i] != 0:
                     with_kappa, with_beta, r = _unsteered(
@@ -219,19 +217,20 @@ def fill_bounds(
                 cell[2] = min(cell[2], _ratio(accel[i], with_kappa))
                 cell[3] = min(cell[3], _ratio(accel[i], with_beta))
                 cell[4] = min(cell[4], _ratio(accel[i], far))
-                if per_rate[i] > 0.0 and max_speed[i] < np.inf:
+                if per_rate[i] > 0.0:
                     d0, d1 = offset_low[i] * kappa_g, offset_high[i] * kappa_g
                     d_low = min(d0 * s0, d0 * s1, d1 * s0, d1 * s1)
                     d_high = max(d0 * s0, d0 * s1, d1 * s0, d1 * s1)
                     loads[i] = max(far - d_low, d_high - near) / max_speed[i]
-            cell[5] = max(0.0, loads.max())
-            _fill_headroom(cell[5:], shares, loads, turns, max_speed, per_rate)
+            cell[5] = loads.max()
+            _fill_headroom(cell[5:], shares, rolls, loads, turns, max_speed, per_rate)
 
 
 @njit(cache=True, inline="always")
 def _fill_headroom(
     out: Array,
     shares: Array,
+    rolls: Array,
     loads: Array,
     turns: Array,
     max_speed: Array,
@@ -239,11 +238,10 @@ def _fill_headroom(
 ) -> None:
     """Bound the rates by ``(1 - |v_s| load) max_speed / per_rate`` of every wheel.
 
-    `out` holds the largest load, then the bounds at each share of it for κ_n and for β.
+    `rolls` are the wheels that roll as they steer. `out` holds the largest load, then
+    the bounds at each share of it for κ_n and for β.
     """
-    for i in range(loads.size):
-        if loads[i] < 0.0:
-            continue
+    for i in rolls:
         for h in range(shares.size):
             left = 1.0 - shares[h] * _share(loads[i], out[0])
             limit = left * max_speed[i] / per_rate[i]

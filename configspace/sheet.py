@@ -23,7 +23,7 @@ __all__ = [
 
 FORMAT_VERSION = 2
 """Version of the file format; raise it when the tensors or the header change."""
-ALGORITHM_VERSION = 3
+ALGORITHM_VERSION = 4
 """Version of the numbers; raise it when building gives other tables."""
 
 

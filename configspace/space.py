@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace.angles import wrap
+from configspace.boxes import bilinear, box_states, column_of, row_of
 from configspace.exact import LINE_TOLERANCE, exact_reason, exact_v_max
 from configspace.grid import Grid, edges_of
 from configspace.kernels import BLOCKED, FREE, MIXED
@@ -72,9 +73,17 @@ class PermissibleSpace:
         return self.header.grid
 
     def v_max(
-        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, *, reverse: bool = False
+        self,
+        kappa_n: npt.ArrayLike,
+        beta: npt.ArrayLike,
+        *,
+        reverse: bool = False,
+        reachable_only: bool = False,
     ) -> FloatArray:
         """Return the fastest permitted |v_s|; never more than is permitted.
+
+        Whether a way inside the space leads there is kept apart from the limits: it is
+        left out unless `reachable_only` asks for it.
 
         Parameters
         ----------
@@ -82,6 +91,10 @@ class PermissibleSpace:
         beta : (...,) float, rad
         reverse : bool
             For v_n < 0 rather than v_n > 0.
+        reachable_only : bool
+            Return 0 also where the configuration lies for sure in another connected
+            component than straight ahead, or than the largest one if straight ahead is
+            blocked (`is_reachable` asks for proof of the contrary).
 
         Returns
         -------
@@ -114,10 +127,17 @@ class PermissibleSpace:
             v[open_] = exact_v_max(
                 self.vehicle, kappa_n[open_], beta[open_], reverse=reverse
             )
+        if reachable_only:
+            v[self._reach[row, column] == BLOCKED] = 0.0
         return v
 
     def contains(
-        self, kappa_n: npt.ArrayLike, beta: npt.ArrayLike, v_s: npt.ArrayLike
+        self,
+        kappa_n: npt.ArrayLike,
+        beta: npt.ArrayLike,
+        v_s: npt.ArrayLike,
+        *,
+        reachable_only: bool = False,
     ) -> BoolArray:
         """Return whether configurations are permitted at these speeds.
 
@@ -127,6 +147,9 @@ class PermissibleSpace:
         beta : (...,) float, rad
         v_s : (...,) float, m/s
             Negative for driving the configuration backwards.
+        reachable_only : bool
+            Return False also where the configuration lies for sure in another connected
+            component than straight ahead; see `v_max`.
 
         Returns
         -------
@@ -141,9 +164,11 @@ class PermissibleSpace:
         kappa_n, beta, v_s = together(
             kappa_n=kappa_n, beta=beta, v_s=finite("v_s", v_s, "m/s")
         )
-        bound = self.v_max(kappa_n, beta)
+        bound = self.v_max(kappa_n, beta, reachable_only=reachable_only)
         if len(self.tables.load) > 1:
-            backwards = self.v_max(kappa_n, beta, reverse=True)
+            backwards = self.v_max(
+                kappa_n, beta, reverse=True, reachable_only=reachable_only
+            )
             bound = np.where(v_s < 0, backwards, bound)
         return np.asarray((np.abs(v_s) <= bound) & (bound > 0))
 
@@ -243,7 +268,8 @@ class PermissibleSpace:
         kappa_n, beta = self._checked(kappa_n, beta)
         row, column, _, _, on_line = self._locate(kappa_n, beta)
         apart = (self._reach[row, column] == BLOCKED) & on_line
-        apart &= self.tables.state[row, column] == FREE
+        if apart.any():  # blocked cells are, too, but have a reason of their own
+            apart &= self.v_max(kappa_n, beta, reverse=reverse) > 0
         extra = np.where(apart, np.uint16(Reason.UNREACHABLE), np.uint16(0))
         if self.vehicle is not None:
             why, who = exact_reason(self.vehicle, kappa_n, beta, reverse=reverse)
@@ -274,7 +300,10 @@ class PermissibleSpace:
 
     @cached_property
     def _reach(self) -> npt.NDArray[np.uint8]:
-        """Codes of `configspace.topology.reachable` per cell."""
+        """Per cell `FREE` if reached for sure, `BLOCKED` if apart for sure, or `MIXED`.
+
+        The codes of `configspace.topology.reachable`.
+        """
         from configspace.topology import reachable
 
         line = self.line_beta
@@ -314,58 +343,12 @@ class PermissibleSpace:
         v_low : (n,) float, m/s
             v_max is at least this all over the box where it is `FREE`.
         """
-        load = self.tables.load[self._direction(reverse)]
-        state = self.tables.state
-        columns = state.shape[1]
-        sound = (kappa_low >= -2) & (kappa_low <= kappa_high) & (kappa_high <= 2)
-        sound &= beta_low <= beta_high
-        kappa_low, kappa_high = (
-            np.where(sound, k, 0.0) for k in (kappa_low, kappa_high)
+        return box_states(
+            self.header,
+            self.tables,
+            (kappa_low, kappa_high, beta_low, beta_high),
+            self._direction(reverse),
         )
-        beta_low, beta_high = (np.where(sound, b, 0.0) for b in (beta_low, beta_high))
-        k0, f0 = self._row(kappa_low)
-        k1, f1 = self._row(kappa_high)
-        if self.is_translating:
-            sound &= (kappa_low >= -LINE_TOLERANCE) & (kappa_high <= LINE_TOLERANCE)
-        if columns == 1:
-            m0, g0 = np.zeros_like(k0), np.zeros_like(f0)
-            m1, g1 = m0, g0
-        else:
-            m0, g0 = self._column(beta_low)
-            step = 2 * np.pi / columns
-            reach = g0 + (beta_high - beta_low) / step * (1 + 1e-12)
-            m1 = m0 + np.floor(reach).astype(np.int64)
-            g1 = reach - np.floor(reach)
-        near = (k1 - k0 <= 1) & (m1 - m0 <= 1)
-        left, right = m0 % columns, m1 % columns
-        corners = ((k0, left), (k0, right), (k1, left), (k1, right))
-        all_free = np.all([state[at] == FREE for at in corners], axis=0)
-        all_blocked = np.all([state[at] == BLOCKED for at in corners], axis=0)
-        all_free |= self._parts_free(k0 + f0, k1 + f1, m0 + g0, m1 + g1)
-        # A bilinear function is largest at a corner of a box; an edge between two
-        # cells divides the box, so it counts as a corner from either side.
-        over_k, over_m = (k1 > k0).astype(float), (m1 > m0).astype(float)
-        rows_at = ((k0, f0), (k0, np.where(k1 > k0, over_k, f1)), (k1, f1))
-        columns_at = ((left, g0), (left, np.where(m1 > m0, over_m, g1)), (right, g1))
-        worst = np.max(
-            [
-                _bilinear(load, row, column, x, y)
-                for row, x in rows_at
-                for column, y in columns_at
-            ],
-            axis=0,
-        )
-        # A box over all β, as at the poles: whole rows of cells.
-        ring = (k1 - k0 <= 1) & ~near
-        row_free = (state == FREE).all(axis=1)
-        all_free = np.where(ring, row_free[k0] & row_free[k1], all_free & near)
-        ring_load = load.max(axis=1)
-        at_ring = [(1 - f) * ring_load[k] + f * ring_load[k + 1] for k, f in rows_at]
-        worst = np.where(ring, np.max(at_ring, axis=0), worst)
-        answer = np.full(k0.shape, MIXED, np.uint8)
-        answer[all_free & sound] = FREE
-        answer[all_blocked & near & sound] = BLOCKED
-        return answer, (1 - 1e-14) / np.sqrt(worst)
 
     def save(self, path: str | Path) -> None:
         """Write the data sheet; it can be used without the vehicle.
@@ -392,53 +375,14 @@ class PermissibleSpace:
     def _direction(self, reverse: bool) -> Literal[0, 1]:
         return 1 if reverse and len(self.tables.load) > 1 else 0
 
-    def _parts_free(
-        self,
-        k_low: FloatArray,
-        k_high: FloatArray,
-        m_low: FloatArray,
-        m_high: FloatArray,
-    ) -> BoolArray:
-        """Return whether boxes lie in two by two free parts of cells at most.
-
-        The boxes are given in cells, β not wrapped.
-        """
-        rows, columns = self.tables.state.shape
-        ends = [
-            np.floor(4 * x).astype(np.int64) for x in (k_low, k_high, m_low, m_high)
-        ]
-        i0, i1 = (np.minimum(x, 4 * rows - 1) for x in ends[:2])
-        j0, j1 = ends[2:] if columns > 1 else (np.minimum(x, 3) for x in ends[2:])
-        free = (i1 - i0 <= 1) & (j1 - j0 <= 1)
-        for i in (i0, i1):
-            for j in (j0, j1):
-                parts = self.tables.parts[i // 4, (j // 4) % columns]
-                free = free & ((parts >> (4 * (i % 4) + j % 4)) & 1 == 1)
-        return np.asarray(free)
-
-    def _row(self, kappa_n: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Return the row of cells and the place within it, 0 to 1."""
-        if self.is_translating:
-            return np.zeros(kappa_n.shape, np.int64), np.zeros(kappa_n.shape)
-        position = (kappa_n + 2) * (self.grid.n_kappa / 4)
-        row = np.clip(position.astype(np.int64), 0, self.grid.n_kappa - 1)
-        return row, position - row
-
-    def _column(self, beta: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Return the column of cells and the place within it, 0 to 1."""
-        columns = self.tables.state.shape[1]
-        position = np.mod(beta + np.pi, 2 * np.pi) * (columns / (2 * np.pi))
-        column = np.clip(position.astype(np.int64), 0, columns - 1)
-        return column, np.clip(position - column, 0.0, 1.0)
-
     def _locate(
         self, kappa_n: FloatArray, beta: FloatArray
     ) -> tuple[
         npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray, FloatArray, BoolArray
     ]:
-        row, fk = self._row(kappa_n)
+        row, fk = row_of(self.header, kappa_n)
         if self.line_beta is None:
-            column, fb = self._column(beta)
+            column, fb = column_of(self.tables.state.shape[1], beta)
             on_line = np.ones(row.shape, dtype=bool)
             if self.is_translating:
                 on_line = np.abs(kappa_n) <= LINE_TOLERANCE
@@ -455,19 +399,4 @@ class PermissibleSpace:
         fb: FloatArray,
         reverse: bool,
     ) -> FloatArray:
-        return _bilinear(
-            self.tables.load[self._direction(reverse)], row, column, fk, fb
-        )
-
-
-def _bilinear(
-    nodes: npt.NDArray[np.float32],
-    row: npt.NDArray[np.int64],
-    column: npt.NDArray[np.int64],
-    fk: FloatArray,
-    fb: FloatArray,
-) -> FloatArray:
-    """Return nodes interpolated bilinearly within their cells."""
-    below = (1 - fb) * nodes[row, column] + fb * nodes[row, column + 1]
-    above = (1 - fb) * nodes[row + 1, column] + fb * nodes[row + 1, column + 1]
-    return np.asarray((1 - fk) * below + fk * above, dtype=np.float64)
+        return bilinear(self.tables.load[self._direction(reverse)], row, column, fk, fb)

@@ -5,6 +5,10 @@ its direction, the longitude φ and the latitude θ, are Connette's spherical tw
 d = 1/κ_g it is the Omni-Curve state in other clothes: φ = β, and (cos θ, sin θ) is
 (c, s) scaled to length 1. Both are regular where the centre of rotation is at infinity.
 
+Which d is a question of purpose. 1/κ_g fits the Omni-Curve-Parameters; with
+`energy_length` ρ is the speed of kinetic energy, ``E = m ρ²/2`` for every direction, so
+the angle between two directions is one that energy sees.
+
 References
 ----------
 Connette 2013, sections 3.1 and 3.2; spec/steered-wheels §2.2, §2.9, §2.10.
@@ -18,14 +22,19 @@ import numpy.typing as npt
 from configspace.angles import wrap
 from configspace.errors import InvalidInput, Problem
 from configspace.omni_curve import (
+    components,
     curvature_of_ratio,
     finite,
+    nominal_curvature,
     together,
 )
 
 __all__ = [
+    "angular_distance",
+    "energy_length",
     "from_spherical",
     "omni_curve_to_spherical",
+    "sphere_point",
     "spherical_to_omni_curve",
     "to_spherical",
     "translate",
@@ -206,6 +215,108 @@ def translate(
     p, q = np.abs(z), d * turning
     direction = np.where(p > 0, wrap(np.angle(z + 0.0)), 0.0)
     return rho * np.hypot(p, q) / d, direction, np.arctan2(q, p)
+
+
+def energy_length(mass: float, inertia: float) -> float:
+    """Return the d with which ρ is the speed of kinetic energy: ``E = m ρ²/2``.
+
+    Parameters
+    ----------
+    mass : float, kg, > 0
+    inertia : float, kg m², > 0
+        About the vertical axis through the centre of gravity. The twist must be that of
+        the centre of gravity, too: `translate` leads there from K.
+
+    Returns
+    -------
+    d : float, m
+        ``sqrt(I/m)``, the radius of gyration.
+
+    Raises
+    ------
+    InvalidInput
+        If a value is not positive and finite.
+
+    References
+    ----------
+    Connette 2013, Eq. (5.5), (5.6); spec/steered-wheels §2.2 (b), O-09.
+
+    Examples
+    --------
+    >>> d = energy_length(mass=100.0, inertia=9.0)
+    >>> rho, _, _ = to_spherical([0.3, 0.0, 1.0], d)
+    >>> round(float(100.0 * rho**2 / 2), 6), 100 * 0.3**2 / 2 + 9 * 1.0**2 / 2
+    (9.0, 9.0)
+    """
+    values = []
+    for name, given, unit in (("mass", mass, "kg"), ("inertia", inertia, "kg m²")):
+        value = finite(name, given, unit)
+        if value.ndim or value <= 0:
+            raise InvalidInput(
+                Problem(name, f"{given}", f"one positive number, {unit}")
+            )
+        values.append(float(value))
+    return length_scale(float(np.sqrt(values[1] / values[0])))
+
+
+def sphere_point(
+    kappa_n: npt.ArrayLike, beta: npt.ArrayLike, scale: float = 1.0
+) -> FloatArray:
+    """Return the point of the unit sphere that is a configuration.
+
+    Every configuration is one point: the poles κ_n = ±2 and β = ±π are no borders, and
+    ``(-κ_n, β + π)``, where all wheels are turned by π, is the opposite point.
+
+    Parameters
+    ----------
+    kappa_n : (...,) float, 1, [-2, 2]
+    beta : (...,) float, rad
+    scale : float, 1, > 0
+        ``d κ_g``; 1 is d = 1/κ_g, ``energy_length(m, I) κ_g`` the metric of energy.
+
+    Returns
+    -------
+    point : (..., 3) float, 1
+        ``(cos θ cos φ, cos θ sin φ, sin θ)``.
+
+    Raises
+    ------
+    InvalidInput
+        If a value is not finite, `kappa_n` is outside [-2, 2] or `scale` not positive.
+
+    References
+    ----------
+    spec/steered-wheels §2.3, §2.10.
+    """
+    kappa_n, beta = together(
+        kappa_n=nominal_curvature(kappa_n), beta=finite("beta", beta, "rad")
+    )
+    factor = finite("scale", scale, "1")
+    if factor.ndim or factor <= 0:
+        raise InvalidInput(Problem("scale", f"{scale}", "one positive number"))
+    c, s = components(kappa_n)
+    q = s * float(factor)
+    size = np.hypot(c, q)
+    point = np.stack([c * np.cos(beta), c * np.sin(beta), q], axis=-1)
+    return np.asarray(point / size[..., None])
+
+
+def angular_distance(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:
+    """Return the angle between points of the unit sphere, exact for small ones.
+
+    Parameters
+    ----------
+    a, b : (..., 3) float, 1
+        As `sphere_point` returns them.
+
+    Returns
+    -------
+    angle : (...,) float, rad, [0, π]
+    """
+    a, b = together(a=finite("a", a, "1"), b=finite("b", b, "1"))
+    # Kahan's formula: neither cancels near 0 nor near π.
+    apart, along = (np.linalg.norm(x, axis=-1) for x in (a - b, a + b))
+    return np.asarray(2 * np.arctan2(apart, along))
 
 
 def extended_components(kappa_n: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -264,9 +264,19 @@ def _needed(
     """Return the |u|² at which a wheel just follows the guaranteed rates.
 
     ``α̇ = (ux u̇y - uy u̇x) / |u|²``, the rates of κ_n and β with the worse signs. The
-    velocity changes linearly with κ_n on each branch and turns with β.
+    velocity changes linearly with κ_n on each branch and turns with β. At κ_n = ±2 the
+    motion may leave with any β, so ``Δu`` may stand across the wheel: ``|u × Δu|`` is
+    at most |u|; a line-mobile vehicle leaves along its line.
     """
-    if vehicle.guaranteed is None or wheel.max_steering_rate_deg is None:
+    steering = [
+        wheel.max_steering_rate_deg and math.radians(wheel.max_steering_rate_deg)
+    ]
+    for offset in wheel.offsets if wheel.max_speed else ():
+        # At standstill the wheel rolls by |α̇ D|, and coupled motors also pay for α̇.
+        share = abs(offset) + wheel.steering_coupling
+        steering.append((wheel.max_speed or 0.0) / share if share else None)
+    rate = min((each for each in steering if each), default=math.inf)
+    if vehicle.guaranteed is None or math.isinf(rate):
         return None
     gentle = np.abs(kappa_n) < 1
     side = np.copysign(1.0, kappa_n)
@@ -279,11 +289,14 @@ def _needed(
     )
     by_beta = (-size * along[1], size * along[0])
     turn_kappa = np.abs(u[0] * by_kappa[1] - u[1] * by_kappa[0])
+    if vehicle.mobility.line_beta is None:
+        # Nearer than rounding is at the pole.
+        turn_kappa = np.where(size <= 1e-12, np.hypot(*u), turn_kappa)
     turn_beta = np.abs(u[0] * by_beta[1] - u[1] * by_beta[0])
     rates = vehicle.guaranteed
     asked = turn_kappa * rates.kappa_rate
     asked = asked + turn_beta * math.radians(rates.beta_rate_deg)
-    return np.asarray(asked / math.radians(wheel.max_steering_rate_deg))
+    return np.asarray(asked / rate)
 
 
 def _body_bound(

@@ -121,7 +121,13 @@ def _add_guarantee(rng: np.random.Generator, data: dict[str, Any]) -> None:
         "kappa_rate": float(10.0 ** rng.uniform(-2, 0.3)),
         "beta_rate_deg": float(10.0 ** rng.uniform(-1, 1.7)),
     }
-    for key in rng.choice(list(rates), int(rng.integers(1, 3)), replace=False):
+    if any(wheel["type"] == "fixed" for wheel in data["wheels"]):
+        del rates["beta_rate_deg"]  # β is constant
+    if data.get("synchro"):
+        del rates["kappa_rate"]  # κ_n is 0
+    for key in rng.choice(
+        list(rates), int(rng.integers(1, len(rates) + 1)), replace=False
+    ):
         data.setdefault("guaranteed", {})[str(key)] = rates[str(key)]
 
 

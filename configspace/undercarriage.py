@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Mobility", "WheelPlace", "mobility_of"]
+__all__ = ["Mobility", "WheelPlace", "impossible_rates", "mobility_of"]
 
 # Wheels within a micrometre and a micro-radian share one axle.
 _LENGTH = 1e-6
@@ -80,6 +80,40 @@ def mobility_of(
     foot = first.position + along * axle
     # Keep the file's K to the last bit where it is on the axle already.
     return Mobility(reference if abs(foot - reference) < 1e-12 else foot, heading + 0.0)
+
+
+def impossible_rates(
+    wheels: Sequence[tuple[str, str]],
+    synchro: bool,
+    kappa_rate: float,
+    beta_rate_deg: float,
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the guaranteed rates that the undercarriage has at no configuration.
+
+    Parameters
+    ----------
+    wheels : sequence of (id, type)
+    synchro : bool
+    kappa_rate : float, 1/s
+    beta_rate_deg : float, degrees/s
+
+    Yields
+    ------
+    where, given, allowed : str
+    """
+    fixed = [name for name, kind in wheels if kind == "fixed"]
+    if fixed and beta_rate_deg > 0:
+        yield (
+            "guaranteed.beta_rate_deg",
+            str(beta_rate_deg)[:60],
+            f"0 or left out: the fixed wheel {fixed[0]} keeps β constant",
+        )
+    if synchro and kappa_rate > 0:
+        yield (
+            "guaranteed.kappa_rate",
+            str(kappa_rate)[:60],
+            "0 or left out: a synchro drive cannot leave κ_n = 0",
+        )
 
 
 def skid_contacts(

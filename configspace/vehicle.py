@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Literal, Self, TypeAlias
@@ -25,6 +26,7 @@ from configspace.support import support_edges
 from configspace.undercarriage import (
     Mobility,
     WheelPlace,
+    impossible_rates,
     mobility_of,
     skid_contacts,
 )
@@ -123,6 +125,22 @@ class SteerableWheel(_RollingWheel):
     def offsets(self) -> tuple[float, ...]:
         """Signed lateral offset D of every wheel on the steering axis, m."""
         raise NotImplementedError
+
+    @property
+    def standing_steering_rate(self) -> float:
+        """Largest |α̇| while the vehicle stands, rad/s; infinite if nothing bounds it.
+
+        Steering rolls a wheel beside its axis and takes its share of coupled motors:
+        ``|û| = |u - D (ω + α̇)|`` and ``|û| + coupling |α̇| ≤ max_speed`` leave
+        ``(|D| + coupling) |α̇| ≤ max_speed`` at u = ω = 0 (spec/omni-curve §2, §4).
+        """
+        rate = math.inf
+        if self.max_steering_rate_deg is not None:
+            rate = math.radians(self.max_steering_rate_deg)
+        taken = max(map(abs, self.offsets)) + self.steering_coupling
+        if self.max_speed is not None and taken > 0:
+            rate = min(rate, self.max_speed / taken)
+        return rate
 
 
 class SteeredWheel(SteerableWheel):
@@ -289,6 +307,9 @@ class Vehicle(_Model):
     wheels: tuple[Wheel, ...] = Field(min_length=1, max_length=1000)
     limits: Limits = Limits()
     load: Load | None = None
+    max_payload: Annotated[float, Field(gt=0, le=1e7, allow_inf_nan=False)] | None = (
+        Field(None, description="largest payload, kg; bounds no motion, for choosing")
+    )
     guaranteed: Guaranteed | None = None
     skid_steer: SkidSteer | None = Field(
         None, description="all fixed wheels form two sides that skid as they turn"
@@ -299,39 +320,46 @@ class Vehicle(_Model):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Vehicle:
-        repeated = [i for i, n in Counter(w.id for w in self.wheels).items() if n > 1]
-        if repeated:
+        conflicts = list(self._conflicts())
+        if conflicts:
+            text = "; ".join(f"{where}: {given}" for where, given, _ in conflicts)
             raise PydanticCustomError(
-                "wheel_ids", f"wheels: id {', '.join(repeated)} is used more than once"
+                "conflicts", "{text}", {"text": text, "conflicts": conflicts}
             )
-        at_load = self.limits.lateral_acceleration_at == "center_of_gravity"
-        if at_load and self.load is None:
-            raise PydanticCustomError(
-                "mobility",
-                "limits.lateral_acceleration_at: center_of_gravity, but no load says "
-                "where it is",
-            )
-        if 0 < len(self.footprint) < 3:
-            raise PydanticCustomError(
-                "footprint", "footprint: a polygon needs at least three points"
-            )
-        self._mobility_and_curvature()
         return self
 
-    def _mobility_and_curvature(self) -> None:
+    def _conflicts(self) -> Iterator[tuple[str, str, str]]:
+        """Yield what does not fit together: where, what is given, what is allowed."""
+        more = "see docs/vehicle-file.md"
+        repeated = [i for i, n in Counter(w.id for w in self.wheels).items() if n > 1]
+        if repeated:
+            yield "wheels", f"id {', '.join(repeated)} is used more than once", more
+        at_load = self.limits.lateral_acceleration_at == "center_of_gravity"
+        if at_load and self.load is None:
+            text = "center_of_gravity, but no load says where it is"
+            yield "limits.lateral_acceleration_at", text, more
+        if 0 < len(self.footprint) < 3:
+            yield "footprint", "a polygon needs at least three points", more
+        if self.guaranteed is not None:
+            yield from impossible_rates(
+                [(w.id, w.type) for w in self.wheels],
+                self.synchro,
+                self.guaranteed.kappa_rate,
+                self.guaranteed.beta_rate_deg,
+            )
         try:
             # Both raise ValueError where the wheels or the load do not fit.
             mobility, _ = self.mobility, self.tipping_edges
         except ValueError as error:
-            raise PydanticCustomError(
-                "mobility", str(error).replace("{", "(")
-            ) from None
+            where, _, given = str(error).partition(": ")
+            yield where, given, more
+            return
         if self.kappa_g is None and self._farthest(mobility) == 0:
-            raise PydanticCustomError(
-                "kappa_g",
-                "kappa_g: all wheels stand at the reference point, so the boundary "
-                "curvature must be given (1/m)",
+            text = (
+                "all wheels stand at the reference point, so the boundary curvature "
+                "must be given (1/m)"
             )
+            yield "kappa_g", text, more
 
     @cached_property
     def tipping_edges(self) -> tuple[tuple[complex, float], ...]:

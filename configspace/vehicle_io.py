@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from configspace.errors import InvalidVehicle, Problem
+from configspace.undercarriage import impossible_rates
 from configspace.vehicle import (
     Castor,
     FixedWheel,
@@ -193,20 +194,36 @@ _Loader.add_implicit_resolver(
 
 
 def _problems(errors: list[ErrorDetails], data: dict[Any, Any]) -> Iterator[Problem]:
-    """Word all errors, and the repeated ids that pydantic looks for only at the end."""
+    """Word all errors, and the conflicts that pydantic looks for only at the end."""
     wheels = data.get("wheels")
     for error in errors:
+        if error["type"] == "conflicts":
+            yield from (Problem(*each) for each in error["ctx"]["conflicts"])
         # Wheels with mistakes are dropped, which pydantic reports as too few.
-        if not (
+        elif not (
             error["type"] == "too_short" and error["loc"] == ("wheels",) and wheels
         ):
             yield _problem(error)
-    if isinstance(wheels, list) and all(e["type"] != "wheel_ids" for e in errors):
-        ids = [w["id"] for w in wheels if isinstance(w, dict) and "id" in w]
-        counts = Counter(name for name in ids if isinstance(name, str))
-        repeated = ", ".join(name for name, count in counts.items() if count > 1)
-        if repeated:
-            yield Problem("wheels", f"id {repeated}", "is used more than once")
+    if isinstance(wheels, list) and all(e["type"] != "conflicts" for e in errors):
+        yield from _conflicts([w for w in wheels if isinstance(w, dict)], data)
+
+
+def _conflicts(wheels: list[dict[Any, Any]], data: dict[Any, Any]) -> Iterator[Problem]:
+    """Yield the conflicts that can be told while other values are mistaken."""
+    ids = [w["id"] for w in wheels if isinstance(w.get("id"), str)]
+    repeated = ", ".join(name for name, count in Counter(ids).items() if count > 1)
+    if repeated:
+        yield Problem("wheels", f"id {repeated}", "is used more than once")
+    rates = data.get("guaranteed")
+    if isinstance(rates, dict):
+        kappa_rate, beta_rate = (
+            value if isinstance(value, int | float) else 0.0
+            for value in (rates.get("kappa_rate"), rates.get("beta_rate_deg"))
+        )
+        places = [(str(w.get("id", "?")), str(w.get("type"))) for w in wheels]
+        is_synchro = data.get("synchro") is True
+        for each in impossible_rates(places, is_synchro, kappa_rate, beta_rate):
+            yield Problem(*each)
 
 
 def _without_tags(location: tuple[int | str, ...]) -> Iterator[int | str]:
@@ -229,7 +246,7 @@ def _problem(error: ErrorDetails) -> Problem:
             return Problem(where, "unknown key", _suggestion(error))
         case "missing":
             return Problem(where, "missing", "must be given")
-        case "wheel_ids" | "mobility" | "kappa_g" | "footprint" | "steering_range":
+        case "steering_range":
             head, _, rest = error["msg"].partition(": ")
             prefix = f"{where}." if where else ""
             return Problem(prefix + head, rest, "see docs/vehicle-file.md")

@@ -245,11 +245,16 @@ def exact(
             stillness = min(stillness, still)
             if wheel.steering_range_deg is not None:
                 margin = min(margin, room(wheel, math.atan2(uy, ux)))
-            if vehicle.guaranteed and wheel.max_steering_rate_deg and still > 1e-9:
+            rate = standing_rate(wheel)
+            if vehicle.guaranteed and rate < math.inf and still > 1e-9:
                 by_kappa, by_beta = angle_rates(vehicle, wheel, kappa_n, beta, still)
+                if 2 - abs(kappa_n) <= 1e-12 and line is None:
+                    # Any β: the rate is a sinusoid in it, its size that of two at 90°.
+                    quarter = beta + math.pi / 2
+                    other, _ = angle_rates(vehicle, wheel, kappa_n, quarter, still)
+                    by_kappa = math.hypot(by_kappa, other)
                 asked = abs(by_kappa) * vehicle.guaranteed.kappa_rate
                 asked += abs(by_beta) * math.radians(vehicle.guaranteed.beta_rate_deg)
-                rate = math.radians(wheel.max_steering_rate_deg)
                 spare = min(spare, (rate - asked) / rate)
     limits = vehicle.limits
     v = math.hypot(vx, vy)
@@ -309,6 +314,19 @@ def is_among(
             if s >= -1e-12 and t >= -1e-12 and s + t <= 1:
                 return True
     return False
+
+
+def standing_rate(wheel: SteerableWheel) -> float:
+    """Largest |α̇| at standstill: that of the steering, or what rolling allows."""
+    rate = math.inf
+    if wheel.max_steering_rate_deg is not None:
+        rate = math.radians(wheel.max_steering_rate_deg)
+    if wheel.max_speed is not None:
+        for u in rolling_speeds(wheel, 0.0, 0.0, 1.0):  # as α̇ alone does
+            taken = abs(u) + wheel.steering_coupling
+            if taken > 0:
+                rate = min(rate, wheel.max_speed / taken)
+    return rate
 
 
 def angle_rates(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from configspace import PermissibleSpace
-from omniplan import Report, read_trajectories, validate
+from omniplan import Report, Trajectory, read_trajectories, validate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOLDER = EXAMPLES / "manoeuvres"
@@ -103,6 +103,7 @@ def test_the_files_are_what_the_script_writes(monkeypatch: pytest.MonkeyPatch) -
     assert set(made) == set(WHO_CAN)
     for name, trajectory in made.items():
         (stored,) = read_trajectories(FOLDER / f"{name}.csv")
+        assert isinstance(stored, Trajectory)
         assert np.abs(stored.t - trajectory.t).max() < 1e-9
         assert np.abs(stored.samples - trajectory.samples).max() < 1e-8
 

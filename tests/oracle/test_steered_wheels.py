@@ -457,3 +457,32 @@ def test_noise_of_the_direction(
             ends.append(to_spherical(twist_from_pair(cob, pair, moved, u), D)[1])
         gains.append(float(ends[0] - ends[1]) / (2 * step))
     assert np.linalg.norm(gains) == pytest.approx(SPEC["noise"][key][case], abs=0.005)
+
+
+def test_the_centre_passes_over_a_wheel(cob: Vehicle) -> None:
+    """O-42: with a sign of its speed the wheel keeps its angle, the others turn on."""
+    case = SPEC["over_wheel"]
+    along = np.exp(1j * np.radians(case["direction_deg"]))
+    for side, key in ((1, "others_before_deg"), (-1, "others_after_deg")):
+        centre = complex(*COB["wheels"][0]) + side * case["apart"] * 1j * along
+        alpha, u = states(cob, [centre.imag, -centre.real, 1.0])
+        velocity = u * np.exp(1j * alpha)
+        signed = velocity[0] * along.conjugate()
+        assert signed == pytest.approx(side * case["apart"], abs=1e-12)
+        assert_angles(2 * alpha[1:], 2 * np.radians(case[key]), 4e-6)
+    there = complex(*COB["wheels"][0])
+    _, u = states(cob, [there.imag, -there.real, 1.0])
+    assert u[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_backwards_needs_no_steering(cob: Vehicle) -> None:
+    """O-44: the sign of v_s turns the rolling, the other representation the wheels."""
+    rng = np.random.default_rng(44)
+    kappa_n, beta = rng.uniform(-2, 2, 50), rng.uniform(-3, 3, 50)
+    alpha, u = configspace.wheel_states(cob, kappa_n, beta, 0.5)
+    back, backwards = configspace.wheel_states(cob, kappa_n, beta, -0.5)
+    np.testing.assert_array_equal(back, alpha)
+    np.testing.assert_array_equal(backwards, -u)
+    turned, forwards = configspace.wheel_states(cob, -kappa_n, beta + np.pi, 0.5)
+    assert_angles(turned, alpha + np.pi, 1e-9)
+    np.testing.assert_allclose(forwards, u, atol=1e-12)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from loopback import ANY_PORT, Ask, Fleet, Trajectories
 
 import configspace
 import omniplan
@@ -15,8 +16,6 @@ from services import Client, Server
 from services.endpoint import Endpoint
 from services.session import Peer, Reply
 from services.workers import WorkerPool
-
-ANY_PORT = "tcp/127.0.0.1:0"
 
 
 @pytest.fixture(scope="session")
@@ -45,7 +44,7 @@ def trajectories() -> tuple[omniplan.Trajectory, ...]:
 
 
 @pytest.fixture
-def server(fleet: Sequence[configspace.PermissibleSpace]) -> Iterator[Server]:
+def server(fleet: Fleet) -> Iterator[Server]:
     with Server(fleet, listen=ANY_PORT) as server:
         yield server
 
@@ -54,9 +53,6 @@ def server(fleet: Sequence[configspace.PermissibleSpace]) -> Iterator[Server]:
 def client(server: Server) -> Iterator[Client]:
     with Client(server.endpoint, timeout=30.0) as client:
         yield client
-
-
-Ask = Callable[..., list[Reply]]
 
 
 @pytest.fixture
@@ -74,7 +70,7 @@ def ask(server: Server) -> Iterator[Ask]:
 
 
 @pytest.fixture
-def validate_message(trajectories: Sequence[omniplan.Trajectory]) -> bytes:
+def validate_message(trajectories: Trajectories) -> bytes:
     """A request that is answered without error."""
     data = {
         "vehicle": "ift-four-steered",

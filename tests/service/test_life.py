@@ -6,13 +6,13 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from loopback import ANY_PORT, Fleet, Trajectories
 
-import configspace
 import omniplan
 from services import (
     Client,
@@ -25,10 +25,6 @@ from services import (
 )
 
 pytestmark = pytest.mark.service
-
-ANY_PORT = "tcp/127.0.0.1:0"
-Fleet = Sequence[configspace.PermissibleSpace]
-Trajectories = Sequence[omniplan.Trajectory]
 
 
 @pytest.fixture

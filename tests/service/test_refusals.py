@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import pytest
+from loopback import Ask
 
 import configspace
 import omniplan
@@ -15,8 +16,6 @@ from services.errors import CODES
 from services.session import Reply
 
 pytestmark = pytest.mark.service
-
-Ask = Callable[..., list[Reply]]
 
 
 def refusal(replies: list[Reply]) -> dict[str, Any]:

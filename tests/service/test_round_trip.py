@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
+from loopback import Fleet, Trajectories
 
 import configspace
 import omniplan
@@ -14,9 +13,6 @@ from services.endpoint import Endpoint
 from services.session import Peer
 
 pytestmark = pytest.mark.service
-
-Fleet = Sequence[configspace.PermissibleSpace]
-Trajectories = Sequence[omniplan.Trajectory]
 
 
 def test_validate_gives_the_reports_of_the_call(

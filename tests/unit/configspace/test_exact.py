@@ -2,6 +2,7 @@ import naive
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 import configspace
 from configspace import Reason
@@ -104,3 +105,44 @@ def test_the_pole_of_a_line_mobile_vehicle_is_one_configuration() -> None:
             np.testing.assert_array_equal(space.v_max(pole, beta) > 0, is_permitted)
             why, _ = configspace.exact_reason(vehicle, pole, beta)
             assert ((why & configspace.Reason.SINGULAR != 0) != is_permitted).all()
+
+
+@given(vehicles(("guaranteed",)), st.floats(0, 3))
+def test_the_pole_is_one_configuration_whatever_beta(
+    vehicle: Vehicle, factor: float
+) -> None:
+    data = vehicle.model_dump(mode="json")
+    for key in data["guaranteed"]:
+        data["guaranteed"][key] *= factor
+    vehicle = configspace.vehicle_from_data(data)
+    beta = np.linspace(-np.pi, np.pi, 25)
+    for pole in (2.0, -2.0):
+        for reverse in (False, True):
+            v_max = configspace.exact_v_max(vehicle, pole, beta, reverse=reverse)
+            assert (v_max == v_max[0]).all()
+        why, who = configspace.exact_reason(vehicle, pole, beta)
+        assert (why == why[0]).all()
+        assert (who == who[0]).all()
+
+
+def test_the_pole_asks_for_the_worst_way_to_leave_it() -> None:
+    # Next to the pole c = 2 - κ_n the wheel at (0.5, 0) points to its left; leaving
+    # along x turns it by -dc/dκ_n / |z| = 1 rad, leaving along y by nothing.
+    wheel = {"id": "w", "type": "steered", "x": 0.5, "y": 0.0, "max_speed": 1.0}
+    wheel["max_steering_rate_deg"] = np.degrees(1.0)
+    for rate, is_permitted in ((0.99, True), (1.01, False)):
+        vehicle = configspace.vehicle_from_data(
+            {"name": "v", "wheels": [wheel], "guaranteed": {"kappa_rate": rate}}
+        )
+        near = 2 - 1e-9
+        v_max = configspace.exact_v_max(vehicle, [near, near], [0.0, np.pi / 2])
+        np.testing.assert_array_equal(v_max > 0, [is_permitted, True])
+        at_pole = configspace.exact_v_max(vehicle, 2.0, [0.0, np.pi / 2, 1.0])
+        np.testing.assert_array_equal(at_pole > 0, is_permitted)
+        space = configspace.build_space(vehicle, configspace.Grid(16, 24), cache=False)
+        beta = np.linspace(-np.pi, np.pi, 50)
+        np.testing.assert_array_equal(space.v_max(2.0, beta) > 0, is_permitted)
+        if not is_permitted:  # no cell that touches the pole is free, nor part of one
+            assert (space.tables.state[[0, -1]] != 0).all()
+            assert (space.tables.parts[0] & 0x000F == 0).all()
+            assert (space.tables.parts[-1] & 0xF000 == 0).all()

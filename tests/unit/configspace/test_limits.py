@@ -3,11 +3,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import configspace
 from configspace import Reason, exact_v_max
 from configspace.limits import LoadRow, SectorRow, rows_of
-from configspace.vehicle import Vehicle
+from configspace.rates import rate_limits, rate_polytope
+from configspace.testing import random_configurations, vehicles
+from configspace.vehicle import SteerableWheel, Vehicle
 
 WHEEL = {"type": "steered", "x": 0.5, "y": 0.0, "max_speed": 1.0}
 PASSIVE = {"type": "steered", "x": 1.0, "y": 0.0}
@@ -218,3 +222,70 @@ def test_a_synchro_drive_does_not_turn() -> None:
     why, who = configspace.exact_reason(vehicle, [0.1, -2.0], 0.0)
     np.testing.assert_array_equal(why, Reason.PARALLEL_WHEELS)
     np.testing.assert_array_equal(who, -1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "rate"),
+    [
+        ({"offset": 0.2}, 5.0),
+        ({"offset": -0.2}, 5.0),
+        ({"steering_coupling": 0.1}, 10.0),
+        ({"offset": -0.2, "steering_coupling": 0.05}, 4.0),
+        ({"offset": 0.2, "max_speed": None}, math.inf),
+        ({"offset": 0.2, "max_steering_rate_deg": 90}, math.pi / 2),
+        ({"offset": 0.2, "max_steering_rate_deg": 360}, 5.0),
+        ({"type": "turntable", "track": 0.5}, 4.0),
+        ({}, math.inf),
+    ],
+)
+def test_steering_at_standstill_may_cost_rolling(
+    changes: dict[str, Any], rate: float
+) -> None:
+    (wheel,) = of({**WHEEL, **changes}).wheels
+    assert isinstance(wheel, SteerableWheel)
+    assert wheel.standing_steering_rate == pytest.approx(rate)
+    vehicle = of({**WHEEL, **changes}, limits={"max_speed": 1, "max_yaw_rate_deg": 90})
+    # As the rate limits see it: straight ahead ∂α/∂β = 1 and ∂α/∂κ_n = κ_g x = 1.
+    kappa_n_dot, beta_dot, _ = rate_limits(vehicle, 0.0, 0.0, 0.0, 1.0)
+    assert float(kappa_n_dot) == pytest.approx(rate)
+    assert float(beta_dot) == pytest.approx(rate)
+    # The singular zone begins where the guaranteed rates ask for just this much.
+    for factor, is_permitted in ((0.999, True), (1.001, not math.isfinite(rate))):
+        asked = factor * min(rate, 10.0) / 2
+        guaranteed = {"kappa_rate": asked, "beta_rate_deg": math.degrees(asked)}
+        data = vehicle.model_dump(mode="json") | {"guaranteed": guaranteed}
+        guarding = configspace.vehicle_from_data(data)
+        assert (float(exact_v_max(guarding, 0.0, 0.0)) > 0) == is_permitted
+
+
+@given(vehicles(("guaranteed", "offset", "turntable")), st.integers(0, 2**32))
+def test_permitted_configurations_offer_the_guaranteed_rates_from_standstill(
+    vehicle: Vehicle, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    data = vehicle.model_dump(mode="json")
+    data["guaranteed"] = data["guaranteed"] or {"kappa_rate": 0.4, "beta_rate_deg": 0}
+    if data["synchro"]:
+        data["guaranteed"]["kappa_rate"] = 0
+    for wheel in data["wheels"]:
+        if wheel["type"] in {"steered", "turntable"}:
+            wheel["steering_coupling"] = float(rng.uniform(0, 0.3))
+    vehicle = configspace.vehicle_from_data(data)
+    assert vehicle.guaranteed is not None
+    kappa_n, beta = random_configurations(rng, vehicle, 60)
+    open_ = exact_v_max(vehicle, kappa_n, beta) > 0
+    kappa_n, beta = kappa_n[open_], beta[open_]
+    for at in zip(kappa_n.tolist(), beta.tolist(), strict=True):
+        polytope = rate_polytope(vehicle, *at, 0.0)
+        for sign in (1, -1):
+            rates = np.array(
+                [
+                    vehicle.guaranteed.kappa_rate,
+                    sign * math.radians(vehicle.guaranteed.beta_rate_deg),
+                    0.0,
+                ]
+            )
+            asked = polytope.A @ rates
+            for limit, a, b in zip(polytope.limits, asked, polytope.b, strict=True):
+                if limit in {"steering_rate", "wheel_speed"}:
+                    assert abs(a) <= b * (1 + 1e-6)

@@ -6,8 +6,11 @@ from hypothesis import strategies as st
 
 import configspace
 from configspace.spherical import (
+    angular_distance,
+    energy_length,
     from_spherical,
     omni_curve_to_spherical,
+    sphere_point,
     spherical_to_omni_curve,
     to_spherical,
     translate,
@@ -183,3 +186,69 @@ def test_bad_states_are_named() -> None:
         to_spherical([1.0, 0.0], 1.0)
     with pytest.raises(configspace.InvalidInput, match=r"rho \(2,\), phi \(3,\)"):
         spherical_to_omni_curve([1.0, 2.0], [0.0, 0.0, 0.0], 0.0)
+
+
+# --- points of the sphere and the metric of energy
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_with_the_radius_of_gyration_rho_is_the_speed_of_energy(seed: int) -> None:
+    """Against a cloud of point masses, seen from a K beside its centre of gravity."""
+    rng = np.random.default_rng(seed)
+    mass = rng.uniform(1, 20, 12)
+    place = rng.normal(0, 0.5, 12) + 1j * rng.normal(0, 0.3, 12)  # from K
+    centre = complex((mass * place).sum() / mass.sum())
+    inertia = float((mass * np.abs(place - centre) ** 2).sum())
+    twist = rng.uniform(-1, 1, 3)
+    velocity = complex(twist[0], twist[1]) + 1j * twist[2] * place
+    energy = (mass * np.abs(velocity) ** 2).sum() / 2
+    d = energy_length(float(mass.sum()), inertia)
+    rho, _, _ = translate(*to_spherical(twist, d), centre, d)
+    assert mass.sum() * rho**2 / 2 == pytest.approx(energy, rel=1e-9)
+
+
+def test_energy_of_the_specification() -> None:
+    """O-09: m = 180 kg, I = m d²."""
+    d = 0.2990819286
+    assert energy_length(180.0, 180.0 * d**2) == pytest.approx(d, rel=1e-12)
+    rho = to_spherical([0.4, 0.3, 0.5], energy_length(180.0, 180.0 * d**2))[0]
+    assert 180 * rho**2 / 2 == pytest.approx(24.512625, abs=1e-6)
+
+
+@pytest.mark.parametrize(("mass", "inertia"), [(0, 1), (1, -1), (np.inf, 1), (1, 0)])
+def test_a_mass_that_is_none_is_refused(mass: float, inertia: float) -> None:
+    with pytest.raises(configspace.InvalidInput):
+        energy_length(mass, inertia)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.2, 1.0, 3.0]))
+def test_points_of_the_sphere_are_directions_of_the_twist(
+    seed: int, scale: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    kappa_n, beta = rng.uniform(-2, 2, 50), rng.uniform(-4, 4, 50)
+    twist = configspace.to_twist(kappa_n, beta, 1.0, 2.0)
+    rho, phi, theta = to_spherical(twist, scale / 2.0)
+    point = sphere_point(kappa_n, beta, scale)
+    np.testing.assert_allclose(np.linalg.norm(point, axis=-1), 1, rtol=1e-15)
+    np.testing.assert_allclose(
+        point * rho[:, None], twist * [1, 1, scale / 2.0], atol=1e-12
+    )
+    np.testing.assert_allclose(np.arcsin(point[:, 2]), theta, atol=1e-7)
+    assert np.isfinite(phi).all()
+    opposite = sphere_point(-kappa_n, beta + np.pi, scale)
+    np.testing.assert_allclose(angular_distance(point, opposite), np.pi, rtol=1e-15)
+    np.testing.assert_allclose(
+        angular_distance(point[1:], point[:-1]),
+        np.arccos(np.clip((point[1:] * point[:-1]).sum(axis=-1), -1, 1)),
+        atol=1e-7,
+    )
+
+
+def test_the_pole_is_one_point_and_small_angles_are_exact() -> None:
+    pole = sphere_point(2.0, np.linspace(-3, 3, 7))
+    np.testing.assert_array_equal(pole, np.broadcast_to([0.0, 0.0, 1.0], (7, 3)))
+    near = angular_distance(sphere_point(0.0, 0.0), sphere_point(0.0, 1e-12))
+    assert near == pytest.approx(1e-12, rel=1e-12)
+    with pytest.raises(configspace.InvalidInput, match="scale"):
+        sphere_point(0.0, 0.0, -1.0)

@@ -430,3 +430,63 @@ def test_schema_describes_every_key() -> None:
     assert set(schema["properties"]) == set(Vehicle.model_fields)
     assert schema["additionalProperties"] is False
     json.dumps(schema)
+
+
+LINE = data(wheels=[STEERED, FIXED])
+SYNCHRO = data(synchro=True)
+BETA, KAPPA = "guaranteed.beta_rate_deg", "guaranteed.kappa_rate"
+
+
+@pytest.mark.parametrize(
+    ("given", "where", "said"),
+    [
+        (
+            {**LINE, "guaranteed": {"beta_rate_deg": 20.5}},
+            BETA,
+            "20.5; 0 or left out: the fixed wheel f keeps β constant",
+        ),
+        (
+            {**SYNCHRO, "guaranteed": {"kappa_rate": 0.2, "beta_rate_deg": 5.0}},
+            KAPPA,
+            "0.2; 0 or left out: a synchro drive cannot leave κ_n = 0",
+        ),
+    ],
+)
+def test_rates_that_no_configuration_has_cannot_be_guaranteed(
+    given: dict[str, object], where: str, said: str
+) -> None:
+    assert problems(given) == {where: said}
+    # Together with mistakes of values and with other conflicts.
+    mistakes: dict[str, object] = {"name": "No Name", "kappa_g": -1}
+    assert set(problems({**given, **mistakes})) == {where, *mistakes}
+    polygon: dict[str, object] = {"footprint": [[0, 0], [1, 0]]}
+    both = problems({**given, **polygon})
+    assert set(both) == {where, "footprint"}
+
+
+def test_rates_that_the_undercarriage_has_may_be_guaranteed() -> None:
+    both = {"kappa_rate": 0.2, "beta_rate_deg": 10.0}
+    configspace.vehicle_from_data(data(guaranteed=both))
+    still = {**both, "beta_rate_deg": 0.0}
+    configspace.vehicle_from_data(data(wheels=[STEERED, FIXED], guaranteed=still))
+    still = {**both, "kappa_rate": 0.0}
+    configspace.vehicle_from_data(data(synchro=True, guaranteed=still))
+
+
+def test_conflicts_of_every_kind_come_together() -> None:
+    second = {**FIXED, "x": 1.0}
+    found = problems(
+        {
+            "name": "agv",
+            "wheels": [FIXED, second],
+            "footprint": [[0, 0], [1, 0]],
+            "limits": {"lateral_acceleration_at": "center_of_gravity"},
+            "guaranteed": {"beta_rate_deg": 10},
+        }
+    )
+    assert set(found) == {
+        "wheels",  # repeated ids, and parallel axles
+        "footprint",
+        "limits.lateral_acceleration_at",
+        "guaranteed.beta_rate_deg",
+    }
