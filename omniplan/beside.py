@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace.limits import SectorRow
+from configspace.omni_curve import POLE
 from configspace.vehicle import SteerableWheel
 from omniplan.chords import Change, Chord, over
 from omniplan.motion import Enclosure
@@ -31,17 +32,17 @@ def beside_axis(
 ) -> Iterator[Bounds]:
     """Yield the utilisation of the rolling speed where steering takes a share of it.
 
-    ``û = u - (ω + α̇) D`` for every offset D, and ``|u| + k |α̇|`` for shared motors.
+    ``|û| + k |α̇|`` with ``û = u - (ω + α̇) D`` for every offset D, k for shared motors.
     Of a vehicle's own Omni-Curve-Parameters v_n is the share that driving takes, so
     what steering takes must fit into the rest.
     """
     limit = wheel.max_speed
     assert limit is not None
-    levers = [abs(offset) for offset in wheel.offsets if offset]
-    if wheel.steering_coupling:
-        levers.append(wheel.steering_coupling)
+    coupling = wheel.steering_coupling
     if is_own:
-        for lever in levers:
+        for lever in (abs(offset) + coupling for offset in wheel.offsets):
+            if lever == 0:
+                continue
             share = [r * lever / limit for r in rate]
             low = np.maximum(part.scale0, part.scale1)
             yield np.where(share[0] > 0, low, 0.0), part.scale_high + share[1]
@@ -56,18 +57,19 @@ def beside_axis(
     plain = (part.scale0 == 1) & (part.scale1 == 1) & (part.scale_high == 1)
     for offset in wheel.offsets:
         if offset:
+            levers = offset, coupling
             yield over(
-                _offset_speed(offset, part, chord, own, turn, rate, plain), limit
+                _offset_speed(levers, part, chord, own, turn, rate, plain), limit
             )
-    if wheel.steering_coupling:
-        k = wheel.steering_coupling
-        sizes = np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1
-        low = np.maximum(*(u + k * np.abs(t) for u, t in zip(sizes, turn, strict=True)))
-        yield over((low, chord.far * part.scale_high + k * rate[1]), limit)
+        elif coupling:
+            sizes = np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1
+            given = (u + coupling * np.abs(t) for u, t in zip(sizes, turn, strict=True))
+            most = chord.far * part.scale_high + coupling * rate[1]
+            yield over((np.maximum(*given), most), limit)
 
 
 def _offset_speed(
-    offset: float,
+    levers: tuple[float, float],
     part: Enclosure,
     chord: Chord,
     own: FloatArray,
@@ -75,14 +77,15 @@ def _offset_speed(
     rate: Bounds,
     plain: npt.NDArray[np.bool_],
 ) -> Bounds:
-    """Return bounds on |û| of a wheel `offset` left of its axis.
+    """Return bounds on |û| + k |α̇| of a wheel D left of its axis; `levers` D and k.
 
     With u = σ |U|: ``|û| = ||U| - σ (ω + α̇) D|``.
     """
+    offset, coupling = levers
     omega = part.omega0 * part.scale0, part.omega1 * part.scale1
     low = np.maximum(
         *(
-            np.abs(np.abs(u) * f - own * (w + t) * offset)
+            np.abs(np.abs(u) * f - own * (w + t) * offset) + coupling * np.abs(t)
             for u, f, w, t in zip(
                 (chord.a, chord.b), (part.scale0, part.scale1), omega, turn, strict=True
             )
@@ -99,7 +102,9 @@ def _offset_speed(
     reach = np.maximum(np.abs(part.omega0), np.abs(part.omega1))
     reach = (reach + part.dt**2 / 8 * part.omega_ddot) * part.scale_high
     total = chord.far * part.scale_high + abs(offset) * (reach + rate[1])
-    return low, np.where(plain, high, total)
+    # Without shared motors not 0 times a rate that may be infinite.
+    shared = coupling * rate[1] if coupling else 0.0
+    return low, np.where(plain, high, total) + shared
 
 
 def zone_bounds(
@@ -112,7 +117,8 @@ def zone_bounds(
     """Return what the guaranteed rates ask for, over what the steering rate allows.
 
     As in `configspace.exact.turning_excess`, in units of the twist: the wheel's
-    velocity is ``v_s (c e^{jβ} + s b)``.
+    velocity is ``v_s (c e^{jβ} + s b)``. At a pole the worst β counts, whatever
+    direction the motion takes through it.
     """
     body = Chord.of(part, reference)
     arm = abs(row.b)
@@ -132,12 +138,15 @@ def zone_bounds(
     moved = 2 * np.abs(ends[1].share - ends[0].share)
     moved = moved + 2 * np.abs(ends[1].s - ends[0].s) + spread
     sweep = np.abs(np.angle(body.b * body.a.conj())) + body.spread()
-    sweep = np.where(body.near > 0, sweep, math.pi)
+    # Where a pole may be within the part, any β.
+    apart = body.near > POLE * fastest * (1 + spread)
+    sweep = np.where(apart, sweep, math.pi)
     slack = row.kappa_share * arm * sweep
     slack = slack + row.beta_share * 2 * (2 + arm) * moved
-    # Whatever the direction: |Im(e b̄)| ≤ |b| and |c (c + s f)| ≤ c (c + |b|).
+    # Whatever the direction: |Im(e b̄)| is at most that at a pole, and
+    # |c (c + s f)| ≤ c (c + |b|).
     c = np.minimum(np.maximum(np.abs(ends[0].share), np.abs(ends[1].share)) + moved, 1)
-    most = row.kappa_share * arm + row.beta_share * c * (c + arm)
+    most = row.kappa_share * row.pole_arm + row.beta_share * c * (c + arm)
     asked = np.maximum(ends[0].asked, ends[1].asked)
     asked_high = np.minimum(asked + slack, most)
     # |z|² = |U|² / v_s², at its least between the ends or by what may have moved.
@@ -174,6 +183,9 @@ def _asked(
     v_s = np.maximum(np.maximum(np.abs(v), np.abs(omega) / kappa_g), 1e-300)
     share, z = v / v_s, u / v_s
     e = np.where(np.abs(share) > 0, share / np.maximum(np.abs(share), 1e-300), 1.0)
-    asked = row.kappa_share * np.abs((e * np.conj(row.b)).imag)
+    across = np.abs((e * np.conj(row.b)).imag)
+    if row.line is not None:  # what stands off the line is slip
+        across = np.full_like(across, row.pole_arm)
+    asked = row.kappa_share * np.where(np.abs(share) > POLE, across, row.pole_arm)
     asked = asked + row.beta_share * np.abs((share * z.conj()).real)
     return _End(v_s, share, omega / kappa_g / v_s, asked, np.abs(z))

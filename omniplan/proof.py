@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from omniplan.chords import Chord, speed_of
 from omniplan.motion import Enclosure, Intervals, Motion
 from omniplan.rows import Judge, Tolerances
 
-__all__ = ["Parts", "Proof"]
+__all__ = ["Parts", "Piece", "Proof"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -33,6 +33,14 @@ SHARPENING_HALVINGS = 10
 
 
 @dataclass(frozen=True)
+class Piece:
+    """What lies between two standstills: parts first to last."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
 class Parts:
     """The m parts of a motion and what is known about them."""
 
@@ -44,6 +52,19 @@ class Parts:
     """(m, rows) utilisation that is reached, per representation."""
     high: dict[int, FloatArray]
     """(m, rows) utilisation that is never exceeded."""
+    angles: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    """Followed steering angles at both ends, (m,) rad, by the row of the wheel's range;
+    of wheels that can wind on, once it is chosen how they start."""
+
+    def pieces(self) -> list[Piece]:
+        """Return the runs of parts on which the vehicle moves."""
+        moving = np.flatnonzero(~self.stands)
+        if not moving.size:
+            return []
+        breaks = np.flatnonzero(np.diff(moving) > 1)
+        firsts = moving[np.concatenate([[0], breaks + 1])]
+        lasts = moving[np.concatenate([breaks, [moving.size - 1]])]
+        return [Piece(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
 
     def picked(self, sign: SignArray) -> tuple[FloatArray, FloatArray]:
         """Return low and high of the representation chosen for each part.
@@ -66,6 +87,7 @@ class Proof:
 
     def __init__(self, motion: Motion, judge: Judge, tolerances: Tolerances) -> None:
         self._motion, self._judge, self._tolerances = motion, judge, tolerances
+        self.is_own = motion.is_own
         ambiguous = judge.needs_configuration and not motion.is_own
         self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
         self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
@@ -124,6 +146,20 @@ class Proof:
             return np.asarray((finite & (high > worst * (1 + SHARPNESS))).any(axis=1))
 
         self._halve(blunt, SHARPENING_HALVINGS)
+
+    def refine(
+        self, wanted: Callable[[Parts], BoolArray], halvings: int = MAX_HALVINGS
+    ) -> None:
+        """Halve parts as long as they are wanted finer.
+
+        Parameters
+        ----------
+        wanted : callable
+            From parts to (m,) bool.
+        halvings : int
+            At most this often.
+        """
+        self._halve(wanted, halvings)
 
     def _halve(self, wanted: Callable[[Parts], BoolArray], halvings: int) -> None:
         smallest = self._step / 2**halvings

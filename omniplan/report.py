@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from omniplan.shortfalls import Unfit
 from omniplan.wording import describe
 
 __all__ = ["Advice", "Candidate", "Ranking", "Report", "Violation"]
@@ -24,13 +25,16 @@ class Violation:
     limit: str
     """Which limit: a name of `configspace.Reason`, or ``REVERSE_SPEED``,
     ``STEER_RATE``, ``WHEEL_ACCELERATION``, ``ACCELERATION``, ``DECELERATION``,
-    ``RECONFIGURATION``; the last is a standstill too short to turn the wheels, value
-    and bound in s."""
+    ``RECONFIGURATION``; the last is a standstill too short to turn or unwind the
+    wheels, value and bound in s. ``UNREACHABLE`` is a piece between standstills that is
+    permitted but in another component of the space than straight ahead."""
     wheel: str | None
     """Id of the wheel; None for the vehicle as a whole."""
     value: float | None
-    """The worst value; for a proved violation it is really taken. None for a
-    ``RECONFIGURATION`` for which no way inside the space was found."""
+    """The worst value; for a proved violation it is really taken. Of a wheel with a
+    range of more than a full turn the angle is followed, so it may be beyond ±π. None
+    for ``UNREACHABLE`` and for a ``RECONFIGURATION`` for which no way inside the space
+    was found."""
     bound: float
     """What is permitted."""
     unit: str
@@ -52,13 +56,25 @@ class Violation:
     is_proved: bool
     """True if the value is taken; False if the limit could only not be shown to hold
     within the stated resolution."""
+    scale: float | None = None
+    """What the excess is relative to, in `unit`: half the range of a steering angle;
+    None: the bound itself."""
 
     @property
     def excess(self) -> float:
-        """``|value / bound|``; infinite where the bound is 0 or there is no value."""
-        if self.value is None or self.bound == 0:
+        """How far the value is beyond the bound, relative to the bound's scale, ≥ 0.
+
+        0 if it is not proved to be beyond; infinite where the scale is 0 or there is no
+        value.
+        """
+        scale = abs(self.bound) if self.scale is None else self.scale
+        if self.value is None or scale == 0:
             return math.inf
-        return abs(self.value / self.bound)
+        if self.scale is not None:  # a bound from below or from above, of either sign
+            beyond = abs(self.value - self.bound) if self.is_proved else 0.0
+        else:
+            beyond = abs(self.value) - abs(self.bound)
+        return max(beyond, 0.0) / scale
 
     def __str__(self) -> str:
         """Return one line with wheel, limit, place and numbers."""
@@ -143,6 +159,8 @@ class Ranking:
     criterion: str
     suitable: tuple[Candidate, ...]
     refused: tuple[Report, ...]
+    unfit: tuple[Unfit, ...] = ()
+    """Vehicles that do not meet the requirements, and by how much."""
 
     @property
     def best(self) -> Candidate | None:
@@ -160,12 +178,18 @@ class Ranking:
         return _RANKING.validate_python(data)
 
 
-_SHAPE_LIMITS = ("SINGULAR", "STEER_RANGE", "FIXED_WHEEL", "RECONFIGURATION")
+SHAPE_LIMITS = (
+    "SINGULAR",
+    "STEER_RANGE",
+    "FIXED_WHEEL",
+    "UNREACHABLE",
+    "RECONFIGURATION",
+)
 """Limits of the configuration, which driving slower does not mend."""
 
 
 def _telling(violation: Violation) -> tuple[bool, int, float, float]:
-    order = (*_SHAPE_LIMITS, violation.limit).index(violation.limit)
+    order = (*SHAPE_LIMITS, violation.limit).index(violation.limit)
     return (not violation.is_proved, order, -violation.excess, violation.t)
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from omniplan.motion import Enclosure
 
-__all__ = ["Bounds", "Judge", "Row", "Tolerances"]
+__all__ = ["Bounds", "Judge", "Row", "Tolerances", "WindingWheel"]
 
 FloatArray = npt.NDArray[np.float64]
 Bounds: TypeAlias = tuple[FloatArray, FloatArray]
@@ -55,6 +55,37 @@ class Row:
     """Whether it is about the configuration, which is free while the vehicle stands."""
 
 
+@dataclass(frozen=True)
+class WindingWheel:
+    """A steered wheel with a finite range of more than a full turn.
+
+    Its row is filled in by `omniplan.winding`, as no part of a motion alone can tell
+    how often the wheel has turned before.
+    """
+
+    index: int
+    column: int
+    """Of its steering range among the rows."""
+    contact: complex
+    """Position in the file's frame, m."""
+    least: float
+    """rad"""
+    largest: float
+    """rad"""
+    rate: float
+    """Largest steering rate, rad/s; infinite where none is given."""
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range, rad."""
+        return (self.least + self.largest) / 2
+
+    @property
+    def half(self) -> float:
+        """Half the range, rad, above π."""
+        return (self.largest - self.least) / 2
+
+
 class Judge(Protocol):
     """Judges parts of motions for one vehicle or one data sheet."""
 
@@ -64,6 +95,7 @@ class Judge(Protocol):
     wheel_ids: tuple[str, ...]
     needs_configuration: bool
     """Whether it matters which of the two representations is driven."""
+    winding_wheels: tuple[WindingWheel, ...]
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
         """Return low and high utilisation, (m, rows), of representation `sign`."""

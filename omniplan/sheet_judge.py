@@ -12,7 +12,7 @@ from configspace.kernels import FREE
 from configspace.omni_curve import curvature_of_ratio
 from omniplan.chords import Chord, along, ends_moving, off_line, size, speed_of
 from omniplan.motion import Enclosure
-from omniplan.rows import Bounds, Row, Tolerances
+from omniplan.rows import Bounds, Row, Tolerances, WindingWheel
 
 __all__ = ["SheetJudge"]
 
@@ -32,6 +32,9 @@ class SheetJudge:
         self.reference = complex(*space.header.reference)
         self.wheel_ids = space.header.wheel_ids
         self.needs_configuration = space.line_beta is None
+        # A table knows of directions, not of angles: the cut of a range of more than
+        # a full turn stays blocked.
+        self.winding_wheels: tuple[WindingWheel, ...] = ()
         rows = [
             Row("BLOCKED", -1, 0.0, "m/s", "none", True),
             Row("V_MAX", -1, 1.0, "1", "speed"),

@@ -2,36 +2,36 @@
 
 A piece is what lies between two standstills. Within it the configuration is continuous
 and v_s keeps its sign; at a standstill the wheels may be brought into another
-configuration, inside the space and in the time there is.
+configuration, inside the space and in the time there is. Wheels that can wind on are
+followed throughout: how often each has turned at the start is chosen as well.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from configspace import PermissibleSpace, wheel_directions
-from configspace.angles import wrap
-from configspace.omni_curve import components, curvature_of_ratio
-from configspace.vehicle import SteerableWheel, Vehicle
-from omniplan.judge import judge_for
-from omniplan.motion import Intervals, OmniCurveMotion
-from omniplan.proof import ROUNDING, Parts, Proof
+from configspace import PermissibleSpace
+from configspace.omni_curve import curvature_of_ratio
+from omniplan.motion import Intervals
+from omniplan.proof import ROUNDING, Parts, Piece, Proof
+from omniplan.reach import is_apart
 from omniplan.rows import Judge, Tolerances
+from omniplan.ways import Change, Changer, Configuration, Way
+from omniplan.winding import Anchor, Sweep, sweeps_of, unsettled
+from omniplan.winding_search import SHORT_REST, Track
 
-__all__ = ["Choice", "Reconfiguration", "choose_configurations"]
+__all__ = ["Apart", "Choice", "Reconfiguration", "Standstill", "choose_configurations"]
 
-FloatArray = npt.NDArray[np.float64]
-Configuration = tuple[float, float]
-
-SLOW = 1e4
-"""Seconds per leg when a way is judged: so slow that only its shape matters."""
-RATE_HALVINGS = 5
-"""How finely the time for turning the wheels is added up along a way."""
+UNREACHABLE = 0.75
+"""What a piece that is apart counts where a broken limit counts 1: of two refusals the
+one of a permitted configuration tells more."""
+MAX_LABELS = 8
+"""So many ways to have come to a piece are kept for each representation."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Reconfiguration:
     time: float
     """Time it takes, s; infinite if no way inside the space was found."""
     wheel: int
-    """The wheel that turns furthest, -1 if unknown."""
+    """The wheel that turns furthest or unwinds longest, -1 if unknown."""
     turn: float
-    """By how much that wheel turns, rad."""
+    """By how much that wheel turns, full turns that it unwinds included, rad."""
 
 
 @dataclass(frozen=True)
@@ -60,127 +60,287 @@ class Standstill:
 
 
 @dataclass(frozen=True)
+class Apart:
+    """A piece for sure in another component of the space than straight ahead."""
+
+    t0: float
+    t1: float
+    start: Configuration
+
+
+@dataclass(frozen=True)
 class Choice:
     """The representation of every piece."""
 
     signs: tuple[int, ...]
     standstills: tuple[Standstill, ...]
     """Between consecutive pieces."""
+    anchors: tuple[Anchor, ...] = ()
+    """Where the winding wheels stand, one per piece; none if no wheel winds."""
+    apart: tuple[Apart, ...] = ()
+
+    def piece_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
+        """Return the piece of each part."""
+        cuts = [(stop.t0 + stop.t1) / 2 for stop in self.standstills]
+        return np.searchsorted(cuts, (spans.t0 + spans.t1) / 2)
 
     def sign_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
         """Return the representation of each part."""
-        cuts = [(stop.t0 + stop.t1) / 2 for stop in self.standstills]
-        piece = np.searchsorted(cuts, (spans.t0 + spans.t1) / 2)
-        return np.asarray(np.array(self.signs)[piece])
+        return np.asarray(np.array(self.signs)[self.piece_of(spans)])
 
 
 @dataclass(frozen=True)
-class _Piece:
-    first: int
-    last: int
+class _Option:
+    """One piece in one representation."""
+
+    cost: float
+    """Number of limits that are broken."""
+    sweeps: tuple[Sweep, ...]
+
+
+@dataclass(frozen=True)
+class _Label:
+    """One way to have come to a piece."""
+
+    signs: tuple[int, ...]
+    ways: tuple[Way, ...]
+    cost: float
+    """Without that of the winding wheels."""
+    tracks: tuple[Track, ...]
+
+    @property
+    def total(self) -> float:
+        return self.cost + sum(track.least for track in self.tracks)
+
+    @property
+    def preference(self) -> tuple[float, tuple[int, ...]]:
+        """Order by cost; among equals driving forwards comes first."""
+        return self.total, tuple(-sign for sign in self.signs)
+
+    def is_no_better(self, other: _Label) -> bool:
+        """Return whether another label is as good, however it goes on."""
+        return other.cost <= self.cost and all(
+            bool((theirs.cost <= ours.cost).all())
+            for theirs, ours in zip(other.tracks, self.tracks, strict=True)
+        )
 
 
 def choose_configurations(
-    proof: Proof, judge: Judge, space: PermissibleSpace, tolerances: Tolerances
+    proof: Proof,
+    judge: Judge,
+    space: PermissibleSpace,
+    tolerances: Tolerances,
+    *,
+    allow_unreachable: bool = False,
 ) -> Choice:
     """Choose representations with the fewest violations, then the shortest waits.
 
     Parameters
     ----------
     proof : Proof
-        Decided.
+        Decided; refined until it is known how far wheels wind.
     judge : Judge
     space : PermissibleSpace
     tolerances : Tolerances
+    allow_unreachable : bool
+        Whether pieces may lie in another component than straight ahead.
     """
-    parts = proof.parts
-    pieces = _pieces(parts)
-    if len(proof.signs) == 1 or not pieces:
+    wheels = judge.winding_wheels
+    proof.refine(lambda parts: unsettled(parts, wheels))
+    parts, pieces = proof.parts, proof.parts.pieces()
+    if not pieces:
         return Choice((1,), ())
-    costs = [
-        {
+    lost = {
+        (i, sign): not allow_unreachable and is_apart(parts, piece, sign, judge, space)
+        for i, piece in enumerate(pieces)
+        for sign in proof.signs
+    }
+    if not judge.needs_configuration:
+        return Choice(
+            (1,), (), (), _apart(parts, pieces, [1] * len(pieces), judge, lost)
+        )
+    options = _options(proof, pieces, lost, sweeps_of(parts, pieces, wheels))
+    changer = _Changes(parts, pieces, judge, Changer(judge, space, tolerances))
+    best = _best(options, changer, judge)
+    return Choice(
+        best.signs,
+        _standstills(best, changer, judge),
+        _anchors(best, parts, pieces) if wheels else (),
+        _apart(parts, pieces, best.signs, judge, lost),
+    )
+
+
+def _options(
+    proof: Proof,
+    pieces: Sequence[Piece],
+    lost: dict[tuple[int, int], bool],
+    sweeps: Sequence[tuple[Sweep, ...]],
+) -> list[dict[int, _Option]]:
+    """Return the representations of every piece that are worth a look.
+
+    Only the best of a piece can be part of the best sequence that is valid, and looking
+    for ways between configurations is dear.
+    """
+    options = []
+    for i, (piece, swept) in enumerate(zip(pieces, sweeps, strict=True)):
+        rows = slice(piece.first, piece.last + 1)
+        costs = {
             sign: float(
-                (parts.high[sign][p.first : p.last + 1] > 1 + ROUNDING)
-                .any(axis=0)
-                .sum()
+                (proof.parts.high[sign][rows] > 1 + ROUNDING).any(axis=0).sum()
+                + lost[i, sign] * UNREACHABLE
             )
             for sign in proof.signs
         }
-        for p in pieces
-    ]
-    # Only the best representations of a piece can be part of the best sequence that
-    # is valid, and looking for ways between configurations is dear.
-    costs = [
-        {sign: price for sign, price in cost.items() if price == min(cost.values())}
-        for cost in costs
-    ]
-    changer = _Changer(judge, space, tolerances)
-    changes = [
-        {
-            (before, after): changer.change(
-                _configuration(parts, a.last, before, judge, at_end=True),
-                _configuration(parts, b.first, after, judge, at_end=False),
-            )
-            for before in before_costs
-            for after in after_costs
-        }
-        for (a, before_costs), (b, after_costs) in itertools.pairwise(
-            zip(pieces, costs, strict=True)
+        least = min(costs.values())
+        turned = {1: swept, -1: tuple(sweep.opposite() for sweep in swept)}
+        options.append(
+            {s: _Option(cost, turned[s]) for s, cost in costs.items() if cost == least}
         )
+    return options
+
+
+class _Changes:
+    """What may happen at the standstills between pieces."""
+
+    def __init__(
+        self, parts: Parts, pieces: Sequence[Piece], judge: Judge, changer: Changer
+    ) -> None:
+        self._parts, self._judge, self._changer = parts, judge, changer
+        self._pieces = pieces
+        self._known: dict[tuple[int, int, int], Change] = {}
+
+    def rest(self, i: int) -> tuple[float, float]:
+        """Return start and end of the standstill after piece i, s."""
+        spans = self._parts.spans
+        before, after = self._pieces[i], self._pieces[i + 1]
+        return float(spans.t1[before.last]), float(spans.t0[after.first])
+
+    def change(self, i: int, before: int, after: int) -> Change:
+        """Return the change after piece i between two representations."""
+        key = i, before, after
+        if key not in self._known:
+            parts, judge = self._parts, self._judge
+            last, first = self._pieces[i].last, self._pieces[i + 1].first
+            self._known[key] = self._changer.change(
+                _configuration(parts, last, before, judge, at_end=True),
+                _configuration(parts, first, after, judge, at_end=False),
+            )
+        return self._known[key]
+
+
+def _best(
+    options: Sequence[dict[int, _Option]], changes: _Changes, judge: Judge
+) -> _Label:
+    """Return the best sequence of representations and ways (dynamic programme)."""
+    wheels = judge.winding_wheels
+    labels = [
+        _Label(
+            (sign,),
+            (),
+            option.cost,
+            tuple(map(Track.begin, wheels, option.sweeps)),
+        )
+        for sign, option in options[0].items()
     ]
-    rests = [
-        (float(parts.spans.t1[a.last]), float(parts.spans.t0[b.first]))
-        for a, b in itertools.pairwise(pieces)
-    ]
-    signs = _cheapest(costs, changes, rests)
-    standstills = tuple(
-        Standstill(*rest, options[before, after])
-        for rest, options, before, after in zip(
-            rests, changes, signs[:-1], signs[1:], strict=True
+    for i, present in enumerate(options[1:]):
+        t0, t1 = changes.rest(i)
+        labels = [
+            kept
+            for sign, option in present.items()
+            for kept in _kept(
+                _extended(label, way, sign, option, t1 - t0)
+                for label in labels
+                for way in changes.change(i, label.signs[-1], sign).ways
+            )
+        ]
+    return min(labels, key=lambda label: label.preference)
+
+
+def _extended(
+    label: _Label, way: Way, sign: int, option: _Option, rest: float
+) -> _Label:
+    """Return a label with one more standstill and piece."""
+    price = SHORT_REST if way.time > rest else 0.0
+    # Far below one violation: among equals the wheels turn least.
+    price += min(way.time, 1e3) * 1e-6 + (label.signs[-1] != sign) * 1e-9
+    tracks = tuple(
+        track.then(way, i, sweep, rest)
+        for i, (track, sweep) in enumerate(
+            zip(label.tracks, option.sweeps, strict=True)
         )
     )
-    return Choice(signs, standstills)
+    return _Label(
+        (*label.signs, sign),
+        (*label.ways, way),
+        label.cost + price + option.cost,
+        tracks,
+    )
 
 
-def _pieces(parts: Parts) -> list[_Piece]:
-    """Return the runs of parts on which the vehicle moves."""
-    moving = np.flatnonzero(~parts.stands)
-    if not moving.size:
-        return []
-    breaks = np.flatnonzero(np.diff(moving) > 1)
-    firsts = moving[np.concatenate([[0], breaks + 1])]
-    lasts = moving[np.concatenate([breaks, [moving.size - 1]])]
-    return [_Piece(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+def _kept(labels: Iterable[_Label]) -> list[_Label]:
+    """Return the labels of one representation that may be the best in the end.
+
+    Without winding wheels that is one. To keep only some of many is safe: they are all
+    possible, and what is left out can only make a verdict too strict.
+    """
+    kept: list[_Label] = []
+    for label in sorted(labels, key=lambda label: label.preference):
+        if not any(label.is_no_better(other) for other in kept):
+            kept.append(label)
+        if len(kept) == MAX_LABELS:
+            break
+    return kept
 
 
-def _cheapest(
-    costs: list[dict[int, float]],
-    changes: list[dict[tuple[int, int], Reconfiguration]],
-    rests: list[tuple[float, float]],
-) -> tuple[int, ...]:
-    """Return the best sequence of representations (dynamic programme)."""
-    best: dict[int, tuple[float, tuple[int, ...]]] = {
-        sign: (cost, (sign,)) for sign, cost in costs[0].items()
-    }
-    for cost, options, (t0, t1) in zip(costs[1:], changes, rests, strict=True):
-        step: dict[int, tuple[float, tuple[int, ...]]] = {}
-        for after in cost:
-            candidates = []
-            for before, (total, path) in best.items():
-                time = options[before, after].time
-                price = 0.5 if time > t1 - t0 else 0.0
-                # Far below one violation: among equals the wheels turn least.
-                price += min(time, 1e3) * 1e-6 + (before != after) * 1e-9
-                candidates.append((total + price + cost[after], (*path, after)))
-            step[after] = min(candidates, key=_preference)
-        best = step
-    return min(best.values(), key=_preference)[1]
+def _standstills(
+    best: _Label, changes: _Changes, judge: Judge
+) -> tuple[Standstill, ...]:
+    unwindings = [track.unwound()[1] for track in best.tracks]
+    found = []
+    for i, ((before, after), way) in enumerate(
+        zip(itertools.pairwise(best.signs), best.ways, strict=True)
+    ):
+        change = changes.change(i, before, after)
+        wheel, turn, extra = change.wheel, change.turn, 0.0
+        for j, unwinding in enumerate(each[i] for each in unwindings):
+            if unwinding.time > extra:
+                extra = unwinding.time
+                wheel = judge.winding_wheels[j].index
+                turn = way.sweeps[j].turn + 2 * np.pi * unwinding.turns
+        made = Reconfiguration(change.start, change.goal, way.time + extra, wheel, turn)
+        found.append(Standstill(*changes.rest(i), made))
+    return tuple(found)
 
 
-def _preference(option: tuple[float, tuple[int, ...]]) -> tuple[float, tuple[int, ...]]:
-    """Order by cost; among equals driving forwards comes first."""
-    cost, path = option
-    return cost, tuple(-sign for sign in path)
+def _anchors(best: _Label, parts: Parts, pieces: Sequence[Piece]) -> tuple[Anchor, ...]:
+    """Return where the winding wheels stand at the start of every piece."""
+    angles = []
+    for track in best.tracks:
+        turns, _ = track.unwound()
+        starts = [step.sweep.start for step in track.line()]
+        angles.append([s + 2 * np.pi * k for s, k in zip(starts, turns, strict=True)])
+    return tuple(
+        Anchor(float(parts.spans.t0[piece.first]), tuple(each[i] for each in angles))
+        for i, piece in enumerate(pieces)
+    )
+
+
+def _apart(
+    parts: Parts,
+    pieces: Sequence[Piece],
+    signs: Sequence[int],
+    judge: Judge,
+    lost: dict[tuple[int, int], bool],
+) -> tuple[Apart, ...]:
+    return tuple(
+        Apart(
+            float(parts.spans.t0[piece.first]),
+            float(parts.spans.t1[piece.last]),
+            _configuration(parts, piece.first, sign, judge, at_end=True),
+        )
+        for i, (piece, sign) in enumerate(zip(pieces, signs, strict=True))
+        if lost[i, sign]
+    )
 
 
 def _configuration(
@@ -194,104 +354,3 @@ def _configuration(
     q = own * omega[index] / judge.kappa_g
     kappa_n = float(np.clip(curvature_of_ratio(abs(body), q), -2.0, 2.0))
     return kappa_n, float(np.angle(body)) if abs(body) > 0 else 0.0
-
-
-class _Changer:
-    """Finds ways from configuration to configuration at a standstill."""
-
-    def __init__(
-        self, judge: Judge, space: PermissibleSpace, tolerances: Tolerances
-    ) -> None:
-        self._judge, self._space, self._tolerances = judge, space, tolerances
-
-    def change(self, start: Configuration, goal: Configuration) -> Reconfiguration:
-        """Return the quickest of a few ways through the space.
-
-        The straight way in both directions of β, the way through pure translation and
-        the ways through the poles; a longer way that none of them finds is not looked
-        for, so an answer "no way" may be too strict but never too lenient.
-        """
-        wheel, turn = self._turn(start, goal)
-        if abs(turn) <= self._tolerances.alignment:
-            return Reconfiguration(start, goal, 0.0, wheel, turn)
-        ways = _ways(start, goal)
-        time = min(sum(self._leg_time(leg) for leg in way) for way in ways)
-        return Reconfiguration(start, goal, time, wheel, turn)
-
-    def _turn(self, start: Configuration, goal: Configuration) -> tuple[int, float]:
-        """Return the wheel that must turn furthest, and by how much."""
-        vehicle = self._space.vehicle
-        if vehicle is None:
-            # Without the wheels: the distance of the two motions on the unit scale.
-            motions = [_motion_vector(c) for c in (start, goal)]
-            return -1, float(np.linalg.norm(motions[0] - motions[1]))
-        turns: dict[int, float] = {}
-        for i, wheel in enumerate(vehicle.wheels):
-            if not isinstance(wheel, SteerableWheel):
-                continue
-            a, b = (_angle(vehicle, i, wheel, c) for c in (start, goal))
-            free = wheel.steering_range_deg is None
-            turns[i] = float(wrap(b - a)) if free else b - a
-        if not turns:
-            return -1, 0.0
-        worst = max(turns, key=lambda i: abs(turns[i]))
-        return worst, turns[worst]
-
-    def _leg_time(self, leg: list[Configuration]) -> float:
-        """Return the time along straight pieces; infinite if they leave the space."""
-        t = np.arange(float(len(leg))) * SLOW
-        samples = np.array([(kappa_n, beta, 0.0) for kappa_n, beta in leg])
-        motion = OmniCurveMotion(t, samples, self._judge.kappa_g, self._judge.reference)
-        judge = judge_for(self._space, motion, self._tolerances)
-        proof = Proof(motion, judge, self._tolerances)
-        proof.decide()
-        if (proof.parts.high[1] > 1 + ROUNDING).any():
-            return math.inf
-        spans = proof.parts.spans
-        for _ in range(RATE_HALVINGS):
-            spans = spans.halved(np.ones(spans.t0.shape, dtype=bool))
-        _, high = judge.utilisation(motion.enclose(spans), 1)
-        rates = [row.limit == "STEER_RATE" for row in judge.rows]
-        share = high[:, rates].max(axis=1, initial=0.0)
-        return float(share @ (spans.t1 - spans.t0))
-
-
-def _ways(start: Configuration, goal: Configuration) -> list[list[list[Configuration]]]:
-    """Return ways from start to goal, each a list of legs.
-
-    Legs are joined where β has no meaning, at a pole.
-    """
-    (k0, b0), (k1, b1) = start, goal
-    short = float(wrap(b1 - b0))
-    ways: list[list[list[Configuration]]] = []
-    for turn in (short, short - math.copysign(2 * math.pi, short)):
-        third = turn / 3  # corners less than half a turn apart
-        ways.append(
-            [[(k0 + (k1 - k0) * f / 3, b0 + third * f) for f in range(4)]],
-        )
-        corner = [(0.0, b0 + third * f) for f in range(4)]
-        ways.append([_distinct([(k0, b0), *corner, (k1, b0 + turn)])])
-    for pole in (2.0, -2.0):
-        legs = [_distinct([(k0, b0), (pole, b0)]), _distinct([(pole, b1), (k1, b1)])]
-        ways.append([leg for leg in legs if len(leg) > 1])
-    return ways
-
-
-def _distinct(leg: list[Configuration]) -> list[Configuration]:
-    """Return the leg without corners that repeat."""
-    return [c for i, c in enumerate(leg) if i == 0 or c != leg[i - 1]]
-
-
-def _angle(vehicle: Vehicle, i: int, wheel: SteerableWheel, at: Configuration) -> float:
-    """Return a steering angle, rad, as it stands within the wheel's range."""
-    z = complex(wheel_directions(vehicle, *at)[i])
-    alpha = math.atan2(z.imag, z.real)
-    if wheel.steering_range_deg is None:
-        return alpha
-    middle = sum(wheel.steering_range) / 2
-    return middle + float(wrap(alpha - middle))
-
-
-def _motion_vector(at: Configuration) -> FloatArray:
-    c, s = components(at[0])
-    return np.array([c * math.cos(at[1]), c * math.sin(at[1]), s], dtype=np.float64)

@@ -8,8 +8,9 @@ stays undecided at the stated resolution (see `proof`) is not permitted.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -19,25 +20,35 @@ from configspace.vehicle import SteerableWheel
 from omniplan.chords import Chord
 from omniplan.judge import is_own, judge_for
 from omniplan.motion import Motion, motion_of
+from omniplan.path import Path
 from omniplan.proof import Parts, Proof
 from omniplan.report import Advice, Report
 from omniplan.rows import Judge, Tolerances
 from omniplan.standstill import Choice, choose_configurations
-from omniplan.trajectory import Trajectory
-from omniplan.violations import find_violations, reconfiguration_violations
+from omniplan.trajectory import Trajectory, timed
+from omniplan.violations import (
+    find_violations,
+    reconfiguration_violations,
+    unreachable_violations,
+)
+from omniplan.winding import straddling, wound
 
-__all__ = ["Tolerances", "validate"]
+__all__ = ["Tolerances", "followed", "validate"]
 
 MIN_FACTOR, MAX_FACTOR = 0.01, 100.0
 """Slower or faster than this nothing is promised."""
 FACTOR_STEPS = 6
 """How often a factor that turns out too large is approached."""
+STOP_HALVINGS = 12
+"""How finely it is told when a wheel runs into a stop."""
 
 
 def validate(
-    trajectory: Trajectory,
+    trajectory: Trajectory | Path,
     space: PermissibleSpace,
     tolerances: Tolerances | None = None,
+    *,
+    allow_unreachable: bool = False,
 ) -> Report:
     """Judge a trajectory for a vehicle.
 
@@ -51,11 +62,21 @@ def validate(
     space : PermissibleSpace
     tolerances : Tolerances, optional
         What counts as standing and as free of slip.
+    allow_unreachable : bool
+        Permit pieces in another component of the space than straight ahead: the
+        vehicle must have been brought there otherwise. Without it a piece is refused
+        as ``UNREACHABLE`` if the cells of the space prove that no way leads there; what
+        they leave undecided counts as reachable.
 
     Returns
     -------
     Report
         Valid only if every limit is proved to hold at and between the samples.
+
+    Raises
+    ------
+    InvalidTrajectory
+        For a path: `fastest` gives it times.
 
     References
     ----------
@@ -70,36 +91,49 @@ def validate(
     >>> omniplan.validate(line, space).valid
     True
     """
-    tolerances = tolerances or Tolerances()
-    report = _judged(trajectory, space, tolerances)
-    factor = _proved_factor(report, trajectory, space, tolerances)
+    ask = partial(
+        _judged,
+        space=space,
+        tolerances=tolerances or Tolerances(),
+        allow_unreachable=allow_unreachable,
+    )
+    trajectory = timed(trajectory)
+    report = ask(trajectory)
+    factor = _proved_factor(report, trajectory, ask)
     fastest = trajectory.duration / factor if factor > 0 else None
     report = replace(report, speed_factor=factor, fastest_duration=fastest)
     if report.valid:
         return report
     advice = (
         *_slow_down(report, trajectory),
-        *_dwell(report, trajectory, space, tolerances),
+        *_dwell(report, trajectory, ask),
     )
     return replace(report, advice=advice)
 
 
 def _judged(
-    trajectory: Trajectory, space: PermissibleSpace, tolerances: Tolerances
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    tolerances: Tolerances,
+    allow_unreachable: bool,
 ) -> Report:
     motion = motion_of(trajectory, is_own=is_own(trajectory, space))
     judge = judge_for(space, motion, tolerances)
     proof = Proof(motion, judge, tolerances)
     proof.decide()
-    choice = choose_configurations(proof, judge, space, tolerances)
+    choice = choose_configurations(
+        proof, judge, space, tolerances, allow_unreachable=allow_unreachable
+    )
     proof.sharpen(choice.sign_of)
+    parts = followed(proof, choice, judge, tolerances)
     violations = [
-        *find_violations(proof.parts, choice, judge, trajectory, motion, space),
+        *find_violations(parts, choice, judge, trajectory, motion, space),
         *reconfiguration_violations(choice, judge, trajectory, motion, space),
+        *unreachable_violations(choice, judge, trajectory, motion, space),
     ]
     violations.sort(key=lambda v: (v.t_start, v.limit, v.wheel or ""))
-    margin, tightest, factor = _margins(proof.parts, choice, judge)
-    top_speed, top_yaw_rate = _tops(proof.parts, judge, motion, space)
+    margin, tightest, factor = _margins(parts, choice, judge)
+    top_speed, top_yaw_rate = _tops(parts, judge, motion, space)
     return Report(
         vehicle=space.name,
         trajectory=trajectory.name,
@@ -118,11 +152,37 @@ def _judged(
     )
 
 
+def followed(
+    proof: Proof, choice: Choice, judge: Judge, tolerances: Tolerances
+) -> Parts:
+    """Return the parts with the followed angles of the wheels that wind.
+
+    Parameters
+    ----------
+    proof : Proof
+        Decided and sharpened; refined where wheels run into their stops.
+    choice : Choice
+    judge : Judge
+    tolerances : Tolerances
+    """
+    wheels = judge.winding_wheels
+    if not choice.anchors:
+        return proof.parts
+    floor = -1.0 if proof.is_own else tolerances.standstill
+
+    def follow(parts: Parts) -> Parts:
+        sign, piece = choice.sign_of(parts.spans), choice.piece_of(parts.spans)
+        return wound(parts, judge, sign, piece, choice.anchors, floor)
+
+    proof.refine(lambda parts: straddling(follow(parts), wheels), STOP_HALVINGS)
+    return follow(proof.parts)
+
+
 def _margins(parts: Parts, choice: Choice, judge: Judge) -> tuple[float, str, float]:
     """Return the margin, what it belongs to, and the speed factor."""
     _, high = parts.picked(choice.sign_of(parts.spans))
     worst = {"nothing": 0.0}
-    factors, drivable = [np.inf], True
+    factors, drivable = [np.inf], not choice.apart
     for row, ratio in zip(judge.rows, high.max(axis=0), strict=True):
         name = (
             f"{row.limit} {judge.wheel_ids[row.wheel]}" if row.wheel >= 0 else row.limit
@@ -188,8 +248,7 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
 def _proved_factor(
     report: Report,
     trajectory: Trajectory,
-    space: PermissibleSpace,
-    tolerances: Tolerances,
+    ask: Callable[[Trajectory], Report],
 ) -> float:
     """Return a factor on the speed that validating again has proved, 0 if none.
 
@@ -205,7 +264,7 @@ def _proved_factor(
         return proved
 
     def holds(factor: float) -> bool:
-        return _judged(trajectory.scaled(factor), space, tolerances).valid
+        return ask(trajectory.scaled(factor)).valid
 
     if holds(promised):
         return promised
@@ -232,8 +291,7 @@ def _slow_down(report: Report, trajectory: Trajectory) -> tuple[Advice, ...]:
 def _dwell(
     report: Report,
     trajectory: Trajectory,
-    space: PermissibleSpace,
-    tolerances: Tolerances,
+    ask: Callable[[Trajectory], Report],
 ) -> tuple[Advice, ...]:
     """Return the advice to stand still longer, if that is proved to help."""
     short = [v for v in report.violations if v.limit == "RECONFIGURATION"]
@@ -247,7 +305,7 @@ def _dwell(
         wait = violation.value * (1 + 1e-9) + 1e-6
         longer = longer.with_dwell(row, wait)
         waits.append((float(trajectory.t[row]), wait))
-    if not _judged(longer, space, tolerances).valid:
+    if not ask(longer).valid:
         return ()
     text = " and ".join(f"{wait:.2f} s at t = {t:.2f} s" for t, wait in waits[::-1])
     total = sum(wait for _, wait in waits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -33,14 +34,16 @@ from omniplan.chords import (
     turning,
 )
 from omniplan.motion import Enclosure
-from omniplan.rows import Bounds, Row, Tolerances
+from omniplan.rows import Bounds, Row, Tolerances, WindingWheel
 
-__all__ = ["VehicleJudge"]
+__all__ = ["VehicleJudge", "winds"]
 
 FloatArray = npt.NDArray[np.float64]
 
 SEAM = 1e-9
 """So near to a stop of a full turn either stop may be meant, rad."""
+FULL = 1e-12
+"""A range that exceeds a full turn by less, relative, is one: rounding."""
 
 
 class VehicleJudge:
@@ -70,6 +73,22 @@ class VehicleJudge:
         empty = np.zeros(0)
         nothing = Enclosure(*([empty] * 15))  # type: ignore[arg-type]
         self.rows = tuple(row for row, _ in self._evaluate(nothing, 1))
+        self.winding_wheels = tuple(self._winding_wheels())
+
+    def _winding_wheels(self) -> Iterator[WindingWheel]:
+        for column, row in enumerate(self.rows):
+            if row.limit != "STEER_RANGE" or not winds(row.bound):
+                continue
+            wheel = self._vehicle.wheels[row.wheel]
+            assert isinstance(wheel, SteerableWheel)
+            rate = wheel.max_steering_rate_deg
+            yield WindingWheel(
+                row.wheel,
+                column,
+                self._vehicle.contacts[row.wheel],
+                *wheel.steering_range,
+                math.inf if rate is None else math.radians(rate),
+            )
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
         """Return low and high utilisation, (m, rows), of representation `sign`."""
@@ -134,23 +153,8 @@ class VehicleJudge:
         if row.kappa_share or row.beta_share:
             zone = zone_bounds(part, row, self.kappa_g, self.reference, chord)
             entries.append((Row("SINGULAR_ZONE", i, 1.0, "1", "none", True), zone))
-        least, largest = wheel.steering_range
-        if math.isfinite(largest):
-            half = min((largest - least) / 2, math.pi)
-            middle = (largest + least) / 2
-            start = wrap(np.angle(own * chord.a) - middle)
-            end = start + np.angle(chord.b * chord.a.conj())
-            at_end = wrap(np.angle(own * chord.b) - middle)
-            # The segment sweeps from start to end; its surroundings a little more.
-            high = np.maximum(np.abs(start), np.abs(end)) + chord.spread()
-            if half == math.pi:
-                high = np.maximum(high, _over_the_seam(start, at_end))
-            low = np.maximum(
-                np.where(rolls[0], np.abs(start), 0.0),
-                np.where(rolls[1], np.abs(at_end), 0.0),
-            )
-            stop = Row("STEER_RANGE", i, half, "rad", "none", True)
-            entries.append((stop, (low / half, np.where(lost, np.inf, high / half))))
+        if wheel.steering_range_deg is not None:
+            entries.append(_steering_range(i, wheel, chord, own, rolls))
         rate = turning(part, chord, change, (rolls[0], rolls[1]))
         if wheel.max_steering_rate_deg is not None:
             limit = math.radians(wheel.max_steering_rate_deg)
@@ -197,6 +201,43 @@ class VehicleJudge:
             row = Row("WHEEL_ACCELERATION", i, limit, "m/s²", "acceleration")
             entries.append((row, over(gain, limit)))
         return entries
+
+
+def _steering_range(
+    i: int,
+    wheel: SteerableWheel,
+    chord: Chord,
+    own: FloatArray,
+    rolls: list[npt.NDArray[np.bool_]],
+) -> tuple[Row, Bounds]:
+    """Return the angle aside of the middle of the range.
+
+    Of a wheel that winds the row is left to `omniplan.winding`.
+    """
+    least, largest = wheel.steering_range
+    half, middle = (largest - least) / 2, (largest + least) / 2
+    if winds(half):
+        nothing = np.zeros(own.shape)
+        return Row("STEER_RANGE", i, half, "rad", "none", True), (nothing, nothing)
+    half = min(half, math.pi)
+    start = wrap(np.angle(own * chord.a) - middle)
+    end = start + np.angle(chord.b * chord.a.conj())
+    at_end = wrap(np.angle(own * chord.b) - middle)
+    # The segment sweeps from start to end; its surroundings a little more.
+    high = np.maximum(np.abs(start), np.abs(end)) + chord.spread()
+    if half == math.pi:
+        high = np.maximum(high, _over_the_seam(start, at_end))
+    low = np.maximum(
+        np.where(rolls[0], np.abs(start), 0.0),
+        np.where(rolls[1], np.abs(at_end), 0.0),
+    )
+    high = np.where(chord.near <= 0, np.inf, high / half)
+    return Row("STEER_RANGE", i, half, "rad", "none", True), (low / half, high)
+
+
+def winds(half: float) -> bool:
+    """Return whether half a steering range is more than half a turn, rounding aside."""
+    return half > math.pi * (1 + FULL)
 
 
 def _over_the_seam(start: FloatArray, end: FloatArray) -> FloatArray:

@@ -20,7 +20,11 @@ from omniplan.rows import Judge, Row
 from omniplan.standstill import Choice
 from omniplan.trajectory import Trajectory
 
-__all__ = ["find_violations", "reconfiguration_violations"]
+__all__ = [
+    "find_violations",
+    "reconfiguration_violations",
+    "unreachable_violations",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -81,12 +85,17 @@ class _Describer:
         ratio: float,
         *,
         is_proved: bool,
+        angle: float | None = None,
     ) -> Violation:
-        """Return the violation of a row at a place."""
+        """Return the violation of a row at a place.
+
+        `angle` is the steering angle where it was followed.
+        """
         limit, wheel = row.limit, row.wheel
-        value, bound, unit = ratio * row.bound, row.bound, row.unit
+        value, bound, unit, scale = ratio * row.bound, row.bound, row.unit, None
         if limit == "STEER_RANGE":
-            value, bound = self._angle(row, place)
+            value, bound = self._angle(row, place, angle)
+            scale = row.bound
         elif limit == "SINGULAR":
             position = self._space.vehicle.contacts[wheel]  # type: ignore[union-attr]
             value = abs(place.v + 1j * place.omega * position)
@@ -103,7 +112,7 @@ class _Describer:
             value=value,
             bound=bound,
             unit=unit,
-            index=self._index(place.t),
+            index=self.index(place.t),
             t=place.t,
             t_start=span[0],
             t_end=span[1],
@@ -111,6 +120,7 @@ class _Describer:
             beta=place.beta,
             pose=self.pose(place.t),
             is_proved=is_proved,
+            scale=scale,
         )
 
     def pose(self, t: float) -> tuple[float, float, float] | None:
@@ -120,12 +130,14 @@ class _Describer:
         x, y, theta = self._motion.poses_at(np.array([t]))[0]
         return float(x), float(y), float(theta)
 
-    def _index(self, t: float) -> int:
+    def index(self, t: float) -> int:
         times = self._trajectory.t
         row = int(np.searchsorted(times, t * (1 + 1e-15) + 1e-12, side="right")) - 1
         return min(max(row, 0), times.size - 1)
 
-    def _angle(self, row: Row, place: _Place) -> tuple[float, float]:
+    def _angle(
+        self, row: Row, place: _Place, angle: float | None
+    ) -> tuple[float, float]:
         """Return the steering angle and the end of the range that it passes."""
         vehicle = self._space.vehicle
         assert vehicle is not None
@@ -133,8 +145,11 @@ class _Describer:
         assert isinstance(wheel, SteerableWheel)
         least, largest = wheel.steering_range
         middle = (least + largest) / 2
-        z = place.v + 1j * place.omega * vehicle.contacts[row.wheel]
-        aside = float(wrap(np.angle(z) - middle))
+        if angle is None:
+            z = place.v + 1j * place.omega * vehicle.contacts[row.wheel]
+            aside = float(wrap(np.angle(z) - middle))
+        else:
+            aside = angle - middle
         return middle + aside, middle + math.copysign(row.bound, aside)
 
     def _by_sheet(self, place: _Place) -> tuple[str, int, float]:
@@ -192,7 +207,12 @@ def find_violations(
             place = ends[int(at_end[part, column])]
             span = float(parts.spans.t0[run[0]]), float(parts.spans.t1[run[-1]])
             ratio = float(ranked.max())
-            yield describer.violation(row, place, span, ratio, is_proved=is_proved)
+            angle = None
+            if column in parts.angles:
+                angle = float(parts.angles[column][int(at_end[part, column])][part])
+            yield describer.violation(
+                row, place, span, ratio, is_proved=is_proved, angle=angle
+            )
 
 
 def reconfiguration_violations(
@@ -237,6 +257,43 @@ def reconfiguration_violations(
         )
 
 
+def unreachable_violations(
+    choice: Choice,
+    judge: Judge,
+    trajectory: Trajectory,
+    motion: Motion,
+    space: PermissibleSpace,
+) -> Iterator[Violation]:
+    """Yield the pieces in another component of the space than straight ahead.
+
+    Parameters
+    ----------
+    choice : Choice
+    judge : Judge
+    trajectory : Trajectory
+    motion : Motion
+    space : PermissibleSpace
+    """
+    describer = _Describer(judge, trajectory, motion, space)
+    for piece in choice.apart:
+        kappa_n, beta = piece.start
+        yield Violation(
+            limit="UNREACHABLE",
+            wheel=None,
+            value=None,
+            bound=0.0,
+            unit="1",
+            index=describer.index(piece.t0),
+            t=piece.t0,
+            t_start=piece.t0,
+            t_end=piece.t1,
+            kappa_n=kappa_n,
+            beta=beta,
+            pose=describer.pose(piece.t0),
+            is_proved=True,
+        )
+
+
 def _runs(mask: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.int64]]:
     """Return the runs of True as index arrays."""
     at = np.flatnonzero(mask)
@@ -253,7 +310,12 @@ def _worse_at_end(
         Parts(parts.spans, part, parts.stands, *_bounds(judge, part)).picked(sign)[0]
         for part in (_only(parts.enclosure, "0"), _only(parts.enclosure, "1"))
     ]
-    return np.asarray(lows[1] > lows[0], dtype=bool)
+    worse = np.asarray(lows[1] > lows[0], dtype=bool)
+    for wheel in judge.winding_wheels:
+        if wheel.column in parts.angles:
+            aside = [np.abs(a - wheel.middle) for a in parts.angles[wheel.column]]
+            worse[:, wheel.column] = aside[1] > aside[0]
+    return worse
 
 
 def _bounds(

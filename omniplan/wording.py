@@ -21,7 +21,6 @@ _WHAT = {
     "SINGULAR_ZONE": "steering needed for the guaranteed rates, as a share of its own",
     "TIPPING": "acceleration of the centre of gravity towards a side",
     "PARALLEL_WHEELS": "turning of a vehicle whose wheels all point alike",
-    "UNREACHABLE": "configuration",
     "LATERAL_ACCELERATION": "lateral acceleration",
     "FIXED_WHEEL": "sideways slip of a wheel that does not steer",
     "STEER_RATE": "steering rate",
@@ -46,6 +45,8 @@ def describe(violation: Violation) -> str:
 def _numbers(violation: Violation) -> str:
     if violation.limit == "RECONFIGURATION":
         return _standstill(violation)
+    if violation.limit == "UNREACHABLE":
+        return "permitted, but no way inside the space leads there from straight ahead"
     assert violation.value is not None
     if violation.limit == "STEER_RANGE" and violation.unit == "m/s":
         return "by the data sheet blocked: out of the steering range"
@@ -68,8 +69,8 @@ def _standstill(violation: Violation) -> str:
     if violation.value is None:
         return "at rest the wheels find no way to their new angles inside the space"
     return (
-        f"at rest the wheels need {violation.value:.2f} s to turn to their new angles, "
-        f"there are {violation.bound:.2f} s"
+        f"at rest the wheels need {violation.value:.2f} s to turn to their new angles "
+        f"or to unwind, there are {violation.bound:.2f} s"
     )
 
 
@@ -155,3 +156,6 @@ def ranking_lines(ranking: Ranking) -> Iterator[str]:
         yield f"  no {report.vehicle}: {refusal(report)}"
         for advice in report.advice:
             yield f"     advice: {advice.text}"
+    for unfit in ranking.unfit:
+        for short in unfit.shortfalls:
+            yield f"  unfit {unfit.vehicle}: {short}"

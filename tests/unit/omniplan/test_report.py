@@ -131,8 +131,27 @@ def test_the_headline_is_proved_then_of_the_shape_then_the_largest() -> None:
         assert replace(report, valid=False, violations=given).headline == chosen
 
 
-def test_excess_is_the_share_of_the_bound() -> None:
-    assert violation("SPEED", 3, 2, True).excess == 1.5
-    assert violation("STEER_RANGE", -3, -2, True).excess == 1.5
+def test_excess_is_how_far_beyond_the_bound_on_its_own_scale() -> None:
+    assert violation("SPEED", 3, 2, True).excess == 0.5
+    assert violation("SPEED", 1.9, 2, True).excess == 0
     assert violation("SINGULAR", 0, 0, True).excess == math.inf
     assert violation("RECONFIGURATION", None, 1, False).excess == math.inf
+    assert violation("UNREACHABLE", None, 0, True).excess == math.inf
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "half", "excess"),
+    [
+        (-3, -2, 2, 0.5),
+        (3, 2, 2, 0.5),
+        (-0.5, 0, 1, 0.5),  # range [0, 2]: the bound itself is no scale
+        (0.5, 1, 1, 0.5),  # range [1, 3]: below a positive stop
+        (-0.5, -1, 1, 0.5),  # range [-3, -1]
+    ],
+)
+def test_a_steering_angle_is_beyond_its_stop_by_a_share_of_half_the_range(
+    value: float, bound: float, half: float, excess: float
+) -> None:
+    angle = replace(violation("STEER_RANGE", value, bound, True), scale=half)
+    assert angle.excess == excess
+    assert replace(angle, is_proved=False).excess == 0

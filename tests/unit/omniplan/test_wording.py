@@ -1,6 +1,7 @@
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,6 +121,13 @@ def test_a_steering_angle_is_held_against_the_stop_it_passes(
         )
     )
     assert words in text
+
+
+def test_a_place_that_no_way_leads_to_needs_no_numbers() -> None:
+    text = describe(replace(violation("SPEED", None, 0.0), limit="UNREACHABLE"))
+    assert "permitted, but no way inside the space leads there" in text
+    assert text.endswith("β = +30.0° [UNREACHABLE]")
+    assert_readable(text)
 
 
 def one_sided() -> PermissibleSpace:
