@@ -28,13 +28,15 @@ def beside_axis(
     change: Change,
     own: FloatArray,
     rate: Bounds,
+    moving: tuple[FloatArray, FloatArray],
     is_own: bool,
 ) -> Iterator[Bounds]:
     """Yield the utilisation of the rolling speed where steering takes a share of it.
 
     ``|û| + k |α̇|`` with ``û = u - (ω + α̇) D`` for every offset D, k for shared motors.
     Of a vehicle's own Omni-Curve-Parameters v_n is the share that driving takes, so
-    what steering takes must fit into the rest.
+    what steering takes must fit into the rest. `moving` is 0 at ends where the vehicle
+    stands: how a wheel seems to turn there may be rounding.
     """
     limit = wheel.max_speed
     assert limit is not None
@@ -54,16 +56,18 @@ def beside_axis(
             (chord.b, change.b, np.abs(chord.b)),
         )
     ]
-    plain = (part.scale0 == 1) & (part.scale1 == 1) & (part.scale_high == 1)
     for offset in wheel.offsets:
         if offset:
             levers = offset, coupling
             yield over(
-                _offset_speed(levers, part, chord, own, turn, rate, plain), limit
+                _offset_speed(levers, part, chord, own, turn, rate, moving), limit
             )
         elif coupling:
             sizes = np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1
-            given = (u + coupling * np.abs(t) for u, t in zip(sizes, turn, strict=True))
+            given = (
+                np.where(v > 0, u + coupling * np.abs(t), 0.0)
+                for v, u, t in zip(moving, sizes, turn, strict=True)
+            )
             most = chord.far * part.scale_high + coupling * rate[1]
             yield over((np.maximum(*given), most), limit)
 
@@ -75,7 +79,7 @@ def _offset_speed(
     own: FloatArray,
     turn: list[FloatArray],
     rate: Bounds,
-    plain: npt.NDArray[np.bool_],
+    moving: tuple[FloatArray, FloatArray],
 ) -> Bounds:
     """Return bounds on |û| + k |α̇| of a wheel D left of its axis; `levers` D and k.
 
@@ -85,9 +89,18 @@ def _offset_speed(
     omega = part.omega0 * part.scale0, part.omega1 * part.scale1
     low = np.maximum(
         *(
-            np.abs(np.abs(u) * f - own * (w + t) * offset) + coupling * np.abs(t)
-            for u, f, w, t in zip(
-                (chord.a, chord.b), (part.scale0, part.scale1), omega, turn, strict=True
+            np.where(
+                v > 0,
+                np.abs(np.abs(u) * f - own * (w + t) * offset) + coupling * np.abs(t),
+                0.0,
+            )
+            for v, u, f, w, t in zip(
+                moving,
+                (chord.a, chord.b),
+                (part.scale0, part.scale1),
+                omega,
+                turn,
+                strict=True,
             )
         )
     )
@@ -102,6 +115,7 @@ def _offset_speed(
     reach = np.maximum(np.abs(part.omega0), np.abs(part.omega1))
     reach = (reach + part.dt**2 / 8 * part.omega_ddot) * part.scale_high
     total = chord.far * part.scale_high + abs(offset) * (reach + rate[1])
+    plain = (part.scale0 == 1) & (part.scale1 == 1) & (part.scale_high == 1)
     # Without shared motors not 0 times a rate that may be infinite.
     shared = coupling * rate[1] if coupling else 0.0
     return low, np.where(plain, high, total) + shared
@@ -113,12 +127,13 @@ def zone_bounds(
     kappa_g: float,
     reference: complex,
     chord: Chord,
+    moving: tuple[FloatArray, FloatArray],
 ) -> Bounds:
     """Return what the guaranteed rates ask for, over what the steering rate allows.
 
     As in `configspace.exact.turning_excess`, in units of the twist: the wheel's
     velocity is ``v_s (c e^{jβ} + s b)``. At a pole the worst β counts, whatever
-    direction the motion takes through it.
+    direction the motion takes through it. `moving` is 0 at ends where it stands.
     """
     body = Chord.of(part, reference)
     arm = abs(row.b)
@@ -154,7 +169,11 @@ def zone_bounds(
     room = np.maximum(nearest, chord.near / np.maximum(fastest * (1 + spread), 1e-300))
     with np.errstate(divide="ignore", invalid="ignore"):
         low = np.maximum(
-            *(np.where(end.room > 0, end.asked / end.room**2, 0.0) for end in ends)
+            # At an end at rest the direction may be rounding.
+            *(
+                np.where((v > 0) & (end.room > 0), end.asked / end.room**2, 0.0)
+                for v, end in zip(moving, ends, strict=True)
+            )
         )
         high = np.where(room > 0, asked_high / room**2, np.inf)
     return low, np.maximum(high, low)

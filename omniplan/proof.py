@@ -91,6 +91,7 @@ class Proof:
         ambiguous = judge.needs_configuration and not motion.is_own
         self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
         self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
+        self._is_shape = np.array([row.scaling == "none" for row in judge.rows])
         spans = motion.intervals()
         self._step = spans.t1 - spans.t0
         self.parts = self._evaluate(spans)
@@ -119,8 +120,12 @@ class Proof:
             broken = low > 1 + ROUNDING
             with np.errstate(invalid="ignore"):
                 is_open = (high > 1 + ROUNDING) & ~broken & (high - low > RESOLUTION)
-            # A part that breaks one limit is refused whatever the others say.
+            # A part that breaks one limit is refused whatever the others say. But what
+            # slower driving mends must not hide what it does not: that decides which
+            # representation is driven.
             need |= is_open.any(axis=1) & ~broken.any(axis=1)
+            shape_open = is_open[:, self._is_shape].any(axis=1)
+            need |= shape_open & ~broken[:, self._is_shape].any(axis=1)
         return need
 
     def sharpen(self, sign_of: Callable[[Intervals], SignArray]) -> None:

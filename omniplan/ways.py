@@ -13,9 +13,10 @@ from configspace.angles import wrap
 from configspace.omni_curve import components
 from configspace.vehicle import SteerableWheel, Vehicle
 from omniplan.judge import judge_for
-from omniplan.motion import OmniCurveMotion
+from omniplan.motion import Intervals, OmniCurveMotion
 from omniplan.proof import ROUNDING, Proof
 from omniplan.rows import Judge, Tolerances
+from omniplan.turn_time import Turning, time_of
 from omniplan.winding import Sweep, joined, sweeps_of, unsettled
 
 __all__ = ["Change", "Changer", "Configuration", "Way"]
@@ -146,7 +147,33 @@ class Changer:
         # give, is for steering.
         rates = [row.limit in {"STEER_RATE", "WHEEL_SPEED"} for row in judge.rows]
         share = high[:, rates].max(axis=1, initial=0.0)
-        return Way(float(share @ (spans.t1 - spans.t0)), sweeps)
+        return Way(time_of(self._turning(motion, spans, share)), sweeps)
+
+    def _turning(
+        self, motion: OmniCurveMotion, spans: Intervals, share: FloatArray
+    ) -> Turning:
+        """Return what a leg asks of the wheels whose steering acceleration is known."""
+        directions, vehicle = motion.directions(spans), self._space.vehicle
+        ends, slope, bend = [], [], []
+        for i, wheel in enumerate(() if vehicle is None else vehicle.wheels):
+            limit = getattr(wheel, "max_steering_acceleration_deg", None)
+            if limit is None:
+                continue
+            assert vehicle is not None
+            largest = math.radians(limit)
+            at_ends, steepest = directions.rates(vehicle.contacts[i])
+            _, bent = directions.accelerations(vehicle.contacts[i])
+            ends.append(at_ends / largest)
+            slope.append(steepest / largest)
+            bend.append(bent / largest)
+        none = np.zeros((spans.t0.size, 0))
+        return Turning(
+            spans.t1 - spans.t0,
+            share,
+            np.stack(ends, axis=-1) if ends else np.stack([none, none]),
+            np.stack(slope, axis=-1) if slope else none,
+            np.stack(bend, axis=-1) if bend else none,
+        )
 
 
 def _ways(start: Configuration, goal: Configuration) -> list[list[list[Configuration]]]:

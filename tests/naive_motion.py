@@ -1,9 +1,9 @@
 """A plain simulation of planar motions, to hold verdicts against.
 
 Nothing of `omniplan` is used: motions are sampled finely, angles are followed step by
-step, accelerations and steering rates are differences of neighbouring samples. A
-difference never exceeds the largest derivative, so a motion that keeps its limits
-keeps them here as well.
+step, and what changes is seen from a moment later. Every such difference is a value
+that the derivative takes within that moment, so a motion that keeps its limits keeps
+them here as well. `naive_limits` holds the samples against the limits.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from configspace.vehicle import Castor, FixedWheel, SteeredWheel, Vehicle
+from configspace.testing import rigid_body
+from configspace.vehicle import Castor, SteerableWheel, Vehicle
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
 TwistAt = Callable[[FloatArray], FloatArray]
 """From times (n,) to body twists (n, 3) of the origin of the vehicle file's frame."""
@@ -30,6 +32,7 @@ STANDSTILL = 1e-3  # m/s, the documented tolerances
 SLIP_ANGLE = math.radians(1.0)
 SLIP_SPEED = 5e-3
 ALIGNMENT = math.radians(1.0)
+MOMENT = 1e-6  # s, over which changes are seen
 
 
 # --- motions
@@ -96,6 +99,27 @@ def _spline(t: FloatArray, poses: FloatArray, rest0: bool, rest1: bool) -> Cubic
     return CubicSpline(t, poses, bc_type=ends)
 
 
+def omni_curve_motion(t: FloatArray, samples: FloatArray, vehicle: Vehicle) -> TwistAt:
+    """(κ_n, β, v_n) linear in time, v_n the share of the exact v_max."""
+    kappa_g, (kx, ky) = naive.kappa_g(vehicle), naive.reference(vehicle)
+
+    def at(when: FloatArray) -> FloatArray:
+        k, b, share = (np.interp(when, t, column) for column in samples.T)
+        k = np.clip(k, -2, 2)
+        # Where the wheels cannot point that way the speed is as if they could.
+        v_max = [rigid_body(vehicle, k, b, reverse=r).v_max for r in (False, True)]
+        v_s = share * np.minimum(np.where(share < 0, v_max[1], v_max[0]), 100.0)
+        rows = np.stack([k, b, v_s], axis=-1).tolist()
+        twists = np.array(
+            [naive.twist(kn, be, v, kappa_g) for kn, be, v in rows]
+        ).reshape(-1, 3)
+        twists[:, 0] += twists[:, 2] * ky
+        twists[:, 1] -= twists[:, 2] * kx
+        return twists
+
+    return at
+
+
 def instants(t: FloatArray, per_interval: int) -> FloatArray:
     """Times with `per_interval` steps between any two knots, knots included."""
     fine = [
@@ -105,18 +129,7 @@ def instants(t: FloatArray, per_interval: int) -> FloatArray:
     return np.concatenate([*fine, t[-1:]])
 
 
-# --- limits
-
-
-@dataclass(frozen=True)
-class Breach:
-    """A limit that is broken in the simulation."""
-
-    limit: str
-    wheel: str | None
-    value: float
-    bound: float
-    t: float
+# --- samples
 
 
 @dataclass(frozen=True)
@@ -126,17 +139,39 @@ class Piece:
     first: int
     last: int
 
+    @property
+    def rows(self) -> slice:
+        return slice(self.first, self.last + 1)
+
 
 class Simulation:
-    """One motion of one vehicle, sampled."""
+    """One motion of one vehicle, sampled; with every sample the twist a moment later.
 
-    def __init__(self, vehicle: Vehicle, t: FloatArray, twists: FloatArray) -> None:
+    Without these (``later``) the rates of change are not known.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        t: FloatArray,
+        twists: FloatArray,
+        later: FloatArray | None = None,
+        moment: FloatArray | None = None,
+        *,
+        has_accelerations: bool = True,
+    ) -> None:
         self.vehicle, self.t = vehicle, t
+        self.twists, self.later = twists, later
+        self.moment = np.full(t.shape, MOMENT) if moment is None else moment
+        self.has_accelerations = has_accelerations and later is not None
         self.vx, self.vy, self.omega = twists.T
-        kx, ky = naive.reference(vehicle)
+        self.reference = naive.reference(vehicle)
+        self.kappa_g = naive.kappa_g(vehicle)
+        self.places = naive.ground(vehicle)
+        kx, ky = self.reference
         self.kx, self.ky = self.vx - self.omega * ky, self.vy + self.omega * kx
         self.speed = np.hypot(self.kx, self.ky)
-        self.v_s = np.maximum(self.speed, np.abs(self.omega) / naive.kappa_g(vehicle))
+        self.v_s = np.maximum(self.speed, np.abs(self.omega) / self.kappa_g)
         self.moves = self.v_s > STANDSTILL * (1 + 1e-6)
         self.pieces = self._pieces()
 
@@ -150,154 +185,182 @@ class Simulation:
                 first = None
         return pieces
 
+    def velocity(self, x: float, y: float) -> ComplexArray:
+        """Velocity of a point of the vehicle in its frame, ``vx + j vy``."""
+        return point_velocity(self.twists, x, y)
+
+    def velocity_later(self, x: float, y: float) -> ComplexArray:
+        assert self.later is not None
+        return point_velocity(self.later, x, y)
+
     def wheel_velocity(self, i: int) -> tuple[FloatArray, FloatArray]:
-        """Velocity of the contact point of wheel i in the vehicle frame."""
-        wheel = self.vehicle.wheels[i]
-        return self.vx - self.omega * wheel.y, self.vy + self.omega * wheel.x
+        """Velocity of the steering axis or contact of wheel i in the vehicle frame."""
+        u = self.velocity(*self.places[i])
+        return u.real, u.imag
 
     def rolling(self, i: int) -> FloatArray:
-        """Rolling speed of wheel i; of a steered wheel its amount."""
-        wheel = self.vehicle.wheels[i]
-        assert not isinstance(wheel, Castor)
-        ux, uy = self.wheel_velocity(i)
-        if isinstance(wheel, SteeredWheel):
-            return np.hypot(ux, uy)
-        delta = math.radians(getattr(wheel, "heading_deg", 0.0))
-        gamma = math.radians(getattr(wheel, "roller_deg", 0.0))
-        along = ux * math.cos(delta + gamma) + uy * math.sin(delta + gamma)
-        return along / math.cos(gamma)
+        """Rolling speed of wheel i; of a steered wheel its amount at the axis."""
+        return rolling_of(self.vehicle, i, self.velocity(*self.places[i]))
 
     def steering(self, i: int, sign: int, piece: Piece) -> FloatArray:
         """Steering angle of wheel i over a piece, followed from its start."""
-        rows = slice(piece.first, piece.last + 1)
-        ux, uy = self.wheel_velocity(i)
-        return np.unwrap(np.arctan2(sign * uy[rows], sign * ux[rows]))
+        u = sign * self.velocity(*self.places[i])[piece.rows]
+        return np.unwrap(np.angle(u))
+
+    def turning(self, i: int) -> FloatArray:
+        """Steering rate of wheel i, from its direction a moment later."""
+        u, later = self.velocity(*self.places[i]), self.velocity_later(*self.places[i])
+        return np.asarray(np.angle(later * u.conj()) / self.moment)
+
+    def contact_speed(self, i: int, offset: float, sign: int) -> FloatArray:
+        """Rolling speed of the wheel `offset` left of steering axis i.
+
+        Its contact moves with the body, ω x p, and on it as the wheel steers.
+        """
+        place = complex(*self.places[i])
+        u, later = self.velocity(*self.places[i]), self.velocity_later(*self.places[i])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ahead, ahead_later = sign * u / np.abs(u), sign * later / np.abs(later)
+        contact = place + 1j * offset * ahead
+        moved = 1j * offset * (ahead_later - ahead) / self.moment
+        body = self.vx + 1j * self.vy + 1j * self.omega * contact
+        return np.asarray(((body + moved) * ahead.conj()).real)
 
     def is_clear(self) -> bool:
         """Whether no wheel passes so near the ICR that an angle cannot be followed."""
         for i, wheel in enumerate(self.vehicle.wheels):
-            if isinstance(wheel, SteeredWheel):
+            if isinstance(wheel, SteerableWheel):
                 for piece in self.pieces:
                     steps = np.abs(np.diff(self.steering(i, 1, piece)))
                     if steps.max(initial=0.0) > 1.5:
                         return False
         return True
 
-    def breaches(self) -> list[Breach]:
-        """Every broken limit that does not depend on the configuration."""
-        found: list[Breach] = []
-        dt = np.diff(self.t)
-        mid = self.t[:-1]
 
-        def hold(
-            limit: str,
-            wheel: str | None,
-            value: FloatArray,
-            bound: float | FloatArray | None,
-            when: FloatArray,
-        ) -> None:
-            if bound is None or not value.size:
-                return
-            bound = np.broadcast_to(bound, value.shape)
-            i = int(np.argmax(value / bound))
-            if value[i] > bound[i] * (1 + 1e-6) + 1e-9:
-                found.append(
-                    Breach(
-                        limit, wheel, float(value[i]), float(bound[i]), float(when[i])
-                    )
-                )
+def point_velocity(twists: FloatArray, x: float, y: float) -> ComplexArray:
+    vx, vy, omega = twists.T
+    return np.asarray(vx - omega * y + 1j * (vy + omega * x))
 
-        for i, wheel in enumerate(self.vehicle.wheels):
-            if isinstance(wheel, Castor):
-                continue
-            u = self.rolling(i)
-            hold("WHEEL_SPEED", wheel.id, np.abs(u), wheel.max_speed, self.t)
-            gain = np.abs(np.diff(u)) / dt
-            hold("WHEEL_ACCELERATION", wheel.id, gain, wheel.max_acceleration, mid)
-            if isinstance(wheel, FixedWheel):
-                ux, uy = self.wheel_velocity(i)
-                delta = math.radians(wheel.heading_deg)
-                aside = np.abs(uy * math.cos(delta) - ux * math.sin(delta))
-                allowed = np.maximum(math.sin(SLIP_ANGLE) * self.v_s, SLIP_SPEED)
-                hold("FIXED_WHEEL", wheel.id, aside, allowed, self.t)
-            if isinstance(wheel, SteeredWheel) and wheel.max_steering_rate_deg:
-                limit = math.radians(wheel.max_steering_rate_deg)
-                for piece in self.pieces:
-                    rows = slice(piece.first, piece.last)
-                    turn = np.abs(np.diff(self.steering(i, 1, piece)))
-                    hold("STEER_RATE", wheel.id, turn / dt[rows], limit, mid[rows])
-        limits = self.vehicle.limits
-        hold("SPEED", None, self.speed, limits.max_speed, self.t)
-        if limits.max_yaw_rate_deg is not None:
-            bound = math.radians(limits.max_yaw_rate_deg)
-            hold("YAW_RATE", None, np.abs(self.omega), bound, self.t)
-        sideways = np.abs(self.omega) * self.speed
-        name = "LATERAL_ACCELERATION"
-        hold(name, None, sideways, limits.max_lateral_acceleration, self.t)
-        gain = np.diff(self.speed) / dt
-        hold("ACCELERATION", None, gain, limits.max_acceleration, mid)
-        hold("DECELERATION", None, -gain, limits.max_deceleration, mid)
-        line = naive.constant_beta(self.vehicle)
-        if line is not None and limits.max_reverse_speed is not None:
-            ahead = self.kx * math.cos(line) + self.ky * math.sin(line)
-            back = np.where(ahead < -STANDSTILL * (1 + 1e-6), self.speed, 0.0)
-            hold("REVERSE_SPEED", None, back, limits.max_reverse_speed, self.t)
-        return found
 
-    def is_possible(self, piece: Piece, sign: int) -> bool:
-        """Whether a piece can be driven in one representation."""
-        vehicle = self.vehicle
-        reverse = vehicle.limits.max_reverse_speed
-        if sign < 0 and reverse is not None and naive.constant_beta(vehicle) is None:
-            rows = slice(piece.first, piece.last + 1)
-            if self.speed[rows].max() > reverse * (1 + 1e-6):
-                return False
-        for i, wheel in enumerate(vehicle.wheels):
-            if isinstance(wheel, SteeredWheel) and wheel.steering_range_deg is not None:
-                least, largest = map(math.radians, wheel.steering_range_deg)
-                alpha = self.steering(i, sign, piece)
-                turns = range(-5, 6)
-                if not any(
-                    alpha.min() + 2 * math.pi * k >= least - 1e-9
-                    and alpha.max() + 2 * math.pi * k <= largest + 1e-9
-                    for k in turns
-                ):
-                    return False
-        return True
-
-    def can_turn(self, before: tuple[Piece, int], after: tuple[Piece, int]) -> bool:
-        """Whether the wheels can turn in time from the end of a piece to the next."""
-        (one, sign_one), (two, sign_two) = before, after
-        there_is = self.t[two.first] - self.t[one.last]
-        for i, wheel in enumerate(self.vehicle.wheels):
-            if not isinstance(wheel, SteeredWheel) or not wheel.max_steering_rate_deg:
-                continue
-            a = float(self.steering(i, sign_one, one)[-1])
-            b = float(self.steering(i, sign_two, two)[0])
-            turn = abs(math.remainder(b - a, 2 * math.pi))
-            rate = math.radians(wheel.max_steering_rate_deg)
-            if turn - ALIGNMENT > rate * there_is * (1 + 1e-6) + 1e-3:
-                return False
-        return True
-
-    def is_drivable(self) -> bool:
-        """Whether some choice of representations keeps the steering ranges."""
-        signs = [
-            [sign for sign in (1, -1) if self.is_possible(piece, sign)]
-            for piece in self.pieces
-        ]
-        return any(
-            all(
-                self.can_turn((self.pieces[i], a), (self.pieces[i + 1], b))
-                for i, (a, b) in enumerate(itertools.pairwise(choice))
-            )
-            for choice in itertools.product(*signs)
-        )
+def rolling_of(vehicle: Vehicle, i: int, u: ComplexArray) -> FloatArray:
+    """Rolling speed of wheel i whose axis or contact moves with u."""
+    wheel = vehicle.wheels[i]
+    assert not isinstance(wheel, Castor)
+    if isinstance(wheel, SteerableWheel):
+        return np.abs(u)
+    delta = math.radians(wheel.heading_deg)
+    gamma = math.radians(getattr(wheel, "roller_deg", 0.0))
+    along = u.real * math.cos(delta + gamma) + u.imag * math.sin(delta + gamma)
+    return np.asarray(along / math.cos(gamma))
 
 
 def simulate(
-    vehicle: Vehicle, t: FloatArray, twist_at: TwistAt, per_interval: int = 60
+    vehicle: Vehicle,
+    t: FloatArray,
+    twist_at: TwistAt,
+    per_interval: int = 60,
+    *,
+    has_accelerations: bool = True,
 ) -> Simulation:
-    """Sample a motion with knots `t` finely."""
-    when = instants(t, per_interval)
-    return Simulation(vehicle, when, twist_at(when))
+    """Sample a motion with knots `t` finely, most finely where directions swing.
+
+    Accelerations of a motion along Omni-Curve-Parameters are no one's promise.
+    """
+    when = np.union1d(instants(t, per_interval), t[1:] - 2 * MOMENT)
+    when = np.union1d(when, near_rest(vehicle, when, twist_at))
+    when = np.union1d(when, edges_of_rest(vehicle, when, twist_at))
+    when = np.minimum(when, t[-1] - MOMENT)
+    when = when[np.concatenate([[True], np.diff(when) > 1e-10])]
+    after = when + MOMENT
+    return Simulation(
+        vehicle,
+        when,
+        twist_at(when),
+        twist_at(after),
+        after - when,
+        has_accelerations=has_accelerations,
+    )
+
+
+def near_rest(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> FloatArray:
+    """Times around those where K or a wheel comes to rest, or nearly so.
+
+    The distance of the times halves towards the slowest instant, so an angle can be
+    followed from one to the next.
+    """
+    axes = [
+        naive.ground(vehicle)[i]
+        for i, wheel in enumerate(vehicle.wheels)
+        if isinstance(wheel, SteerableWheel)
+    ]
+    kappa_g = naive.kappa_g(vehicle)
+    found: list[FloatArray] = [when[:0]]
+    for point in (None, *axes):
+
+        def vectors(
+            at: FloatArray, point: tuple[float, float] | None = point
+        ) -> FloatArray:
+            twists = twist_at(at)
+            if point is None:
+                return moving_vectors(vehicle, twists, kappa_g)
+            u = point_velocity(twists, *point)
+            return np.stack([u.real, u.imag], axis=-1)
+
+        def sizes(at: FloatArray) -> FloatArray:
+            return np.asarray(np.linalg.norm(vectors(at), axis=-1))
+
+        there = vectors(when)
+        size = np.linalg.norm(there, axis=-1)
+        step = np.linalg.norm(np.diff(there, axis=0), axis=-1)
+        low = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+        low &= size[1:-1] < 3 * np.maximum(step[:-1], step[1:]) + STANDSTILL
+        at = np.flatnonzero(low) + 1
+        if not at.size:
+            continue
+        a, b = when[at - 1], when[at + 1]
+        slowest = least(sizes, a, b)
+        reach = np.maximum(b - slowest, slowest - a)[:, None] * 0.5 ** np.arange(1, 20)
+        around = np.concatenate([slowest[:, None] - reach, slowest[:, None] + reach], 1)
+        around = np.clip(around, a[:, None], b[:, None])
+        found += [slowest, around.ravel()]
+    return np.concatenate(found)
+
+
+def moving_vectors(vehicle: Vehicle, twists: FloatArray, kappa_g: float) -> FloatArray:
+    """K's velocity and ω / κ_g, (n, 3)."""
+    v = point_velocity(twists, *naive.reference(vehicle))
+    return np.stack([v.real, v.imag, twists[:, 2] / kappa_g], axis=-1)
+
+
+def least(
+    value: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatArray
+) -> FloatArray:
+    """Where a value is least between a and b, thirds by thirds."""
+    for _ in range(60):
+        one, two = a + (b - a) / 3, b - (b - a) / 3
+        left = value(one) < value(two)
+        a, b = np.where(left, a, one), np.where(left, two, b)
+    return (a + b) / 2
+
+
+def edges_of_rest(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> FloatArray:
+    """Times at which |v_s| passes what counts as standing, seen from where it moves."""
+    kappa_g = naive.kappa_g(vehicle)
+
+    def moves(at: FloatArray) -> BoolArray:
+        x, y, q = moving_vectors(vehicle, twist_at(at), kappa_g).T
+        v_s = np.maximum(np.hypot(x, y), np.abs(q))
+        return np.asarray(v_s > STANDSTILL * (1 + 1e-6))
+
+    now = moves(when)
+    at = np.flatnonzero(now[1:] != now[:-1])
+    if not at.size:
+        return when[:0]
+    still = np.where(now[at], when[at + 1], when[at])
+    moving = np.where(now[at], when[at], when[at + 1])
+    for _ in range(50):
+        middle = (still + moving) / 2
+        on_the_move = moves(middle)
+        moving = np.where(on_the_move, middle, moving)
+        still = np.where(on_the_move, still, middle)
+    return moving

@@ -8,13 +8,16 @@ import logging
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import naive
+import naive_limits
 import naive_motion
 import numpy as np
 import numpy.typing as npt
 import pytest
+from verdict_cases import with_rates
 
 import configspace
 from configspace import Grid, PermissibleSpace, Vehicle
@@ -202,26 +205,13 @@ class Case:
     vehicle: Vehicle
     space: PermissibleSpace
     trajectory: Trajectory
-    simulation: naive_motion.Simulation
     twist_at: naive_motion.TwistAt
+    per_interval: int
 
-
-def with_rates(rng: np.random.Generator, vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle with limits on rates and accelerations here and there."""
-    data = vehicle.model_dump(mode="json")
-    for wheel in data["wheels"]:
-        if wheel["type"] == "steered" and rng.random() < 0.6:
-            wheel["max_steering_rate_deg"] = float(rng.uniform(30, 400))
-        if wheel["type"] != "castor" and rng.random() < 0.5:
-            wheel["max_acceleration"] = float(rng.uniform(0.3, 3))
-    for name, low, high in (
-        ("max_acceleration", 0.3, 2.0),
-        ("max_deceleration", 0.3, 2.0),
-        ("max_reverse_speed", 0.1, 1.5),
-    ):
-        if rng.random() < 0.4:
-            data["limits"][name] = float(rng.uniform(low, high))
-    return configspace.vehicle_from_data(data)
+    @cached_property
+    def simulation(self) -> naive_motion.Simulation:
+        t = self.trajectory.t
+        return naive_motion.simulate(self.vehicle, t, self.twist_at, self.per_interval)
 
 
 def random_twists(
@@ -289,27 +279,24 @@ def cases(seed: int, form: str, vehicles: int, each: int = 4) -> Iterator[Case]:
                 trajectory = Trajectory.from_twists(t, samples, reference_point=point)
                 at = naive_motion.twist_motion(t, samples, *point)
                 steps = 60
-            simulation = naive_motion.simulate(vehicle, t, at, steps)
-            yield Case(vehicle, space, trajectory, simulation, at)
+            yield Case(vehicle, space, trajectory, at, steps)
 
 
 @pytest.mark.parametrize(("form", "seed"), [("twists", 10), ("poses", 11)])
 def test_a_valid_motion_breaks_no_limit_in_a_simulation(form: str, seed: int) -> None:
     valid = forwards = backwards = left = right = 0
-    for case in cases(seed, form, vehicles=120):
+    for case in cases(seed, form, vehicles=48):
         if not validate(case.trajectory, case.space).valid:
             continue
         simulation = case.simulation
-        assert simulation.breaches() == []
-        if simulation.is_clear():
-            assert simulation.is_drivable()
+        assert naive_limits.breaches(simulation) == []
         valid += 1
         forwards += bool((simulation.kx > 0.01).any())
         backwards += bool((simulation.kx < -0.01).any())
         left += bool((simulation.omega > 0.01).any())
         right += bool((simulation.omega < -0.01).any())
-    assert min(forwards, backwards, left, right) > 30
-    assert valid > 150
+    assert min(forwards, backwards, left, right) > 12
+    assert valid > 60
 
 
 @pytest.mark.parametrize(("form", "seed"), [("twists", 12), ("poses", 13)])
@@ -332,7 +319,7 @@ def assert_is_taken(case: Case, violation: Violation) -> None:
     if violation.limit == "STEER_RANGE":
         assert is_outside(case.vehicle, violation)
     elif violation.limit != "SINGULAR":
-        assert violation.excess > 1
+        assert violation.excess > 0
     assert violation.t_start <= violation.t <= violation.t_end
     t = case.trajectory.t
     assert t[violation.index] <= violation.t + 1e-9
@@ -407,87 +394,10 @@ def value_of(here: naive_motion.Simulation, violation: Violation) -> float:
     return float(abs(u[1] - u[0])) / dt
 
 
-# --- relations between verdicts
-
-
-def mirrored(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle with left and right exchanged."""
-    data = vehicle.model_dump(mode="json")
-    for wheel in data["wheels"]:
-        wheel["y"] = -wheel["y"]
-        for key in ("heading_deg", "roller_deg"):
-            if key in wheel:
-                wheel[key] = -wheel[key]
-        if wheel.get("steering_range_deg"):
-            least, largest = wheel["steering_range_deg"]
-            wheel["steering_range_deg"] = [-largest, -least]
-    if data["reference_point"]:
-        data["reference_point"] = [
-            data["reference_point"][0],
-            -data["reference_point"][1],
-        ]
-    return configspace.vehicle_from_data(data)
-
-
-def rebuilt(trajectory: Trajectory, t: FloatArray, samples: FloatArray) -> Trajectory:
-    build = getattr(Trajectory, f"from_{trajectory.form}")
-    out: Trajectory = build(t, samples, reference_point=trajectory.reference_point)
-    return out
-
-
-def broken(report: Report) -> list[tuple[str, str, bool]]:
-    return sorted((v.limit, v.wheel or "", v.is_proved) for v in report.violations)
+# --- relations between verdicts; test_verdicts_relations has more
 
 
 FORMS = pytest.mark.parametrize(("form", "seed"), [("twists", 20), ("poses", 21)])
-
-
-@FORMS
-def test_a_mirrored_trajectory_has_the_mirrored_verdict(form: str, seed: int) -> None:
-    for case in cases(seed, form, vehicles=36, each=3):
-        x, y = case.trajectory.reference_point
-        build = getattr(Trajectory, f"from_{form}")
-        flipped = build(
-            case.trajectory.t,
-            case.trajectory.samples * [1, -1, -1],
-            reference_point=(x, -y),
-        )
-        space = configspace.build_space(mirrored(case.vehicle), COARSE, cache=False)
-        one, two = validate(case.trajectory, case.space), validate(flipped, space)
-        assert broken(one) == broken(two)
-        assert one.margin == pytest.approx(two.margin, rel=1e-3, abs=1e-3)
-
-
-@FORMS
-def test_a_reversed_trajectory_has_the_same_verdict_where_limits_are_symmetric(
-    form: str, seed: int
-) -> None:
-    judged = 0
-    for case in cases(seed + 10, form, vehicles=60, each=3):
-        limits = case.vehicle.limits
-        if limits.max_reverse_speed is not None:
-            continue
-        if limits.max_acceleration != limits.max_deceleration:
-            continue
-        samples = case.trajectory.samples[::-1]
-        if form == "twists":
-            samples = -samples
-        back = rebuilt(case.trajectory, -case.trajectory.t[::-1], samples)
-        judged += 1
-        one, two = validate(case.trajectory, case.space), validate(back, case.space)
-        assert one.valid == two.valid
-    assert judged > 15
-
-
-@FORMS
-@pytest.mark.parametrize("factor", [0.5, 0.1])
-def test_driving_slower_stays_valid(form: str, seed: int, factor: float) -> None:
-    valid = 0
-    for case in cases(seed + 20, form, vehicles=36, each=3):
-        if validate(case.trajectory, case.space).valid:
-            assert validate(case.trajectory.scaled(factor), case.space).valid
-            valid += 1
-    assert valid > 20
 
 
 @FORMS
@@ -573,12 +483,10 @@ def test_a_foreign_omni_curve_motion_is_judged_by_its_twists() -> None:
             trajectory = Trajectory.from_omni_curve(t, k, b, v_n, owner)
             if not validate(trajectory, space).valid:
                 continue
-            simulation = naive_motion.simulate(judged, t, twist_at, 40)
-            rates = {"ACCELERATION", "DECELERATION", "WHEEL_ACCELERATION"}
-            found = [x for x in simulation.breaches() if x.limit not in rates]
-            assert found == []
-            if simulation.is_clear():
-                assert simulation.is_drivable()
+            simulation = naive_motion.simulate(
+                judged, t, twist_at, 40, has_accelerations=False
+            )
+            assert naive_limits.breaches(simulation) == []
             valid += 1
     assert valid > 20
 

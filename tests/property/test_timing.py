@@ -1,0 +1,137 @@
+"""Fastest timings of random paths for random vehicles."""
+
+from __future__ import annotations
+
+import naive_timing
+import numpy as np
+import random_motions
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from timing_cases import demanding_vehicle, smooth_path
+
+from configspace import Grid, PermissibleSpace, build_space
+from configspace.testing import VehicleKind
+from omniplan import Path, Timing, TimingStatus, Trajectory, time_path, validate
+from omniplan.path_motion import path_of, pieces_of
+
+KINDS: tuple[VehicleKind, ...] = ("mecanum", "omni", "steered", "offset", "turntable")
+ALL: tuple[VehicleKind, ...] = (
+    *KINDS,
+    "loaded",
+    "differential",
+    "ackermann",
+    "synchro",
+)
+SEEDS = st.integers(0, 10**6)
+UNJUDGED = {"STEER_ACCELERATION"}
+
+
+def space_of(rng: np.random.Generator, kind: VehicleKind) -> PermissibleSpace:
+    return build_space(demanding_vehicle(rng, kind), Grid(40, 72), cache=False)
+
+
+def timed(path: Path | Trajectory, space: PermissibleSpace) -> Timing:
+    return time_path(path, space, grid=200, steps=250)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(SEEDS, st.sampled_from(ALL))
+def test_what_is_found_is_proved_and_what_is_not_says_where(
+    seed: int, kind: VehicleKind
+) -> None:
+    rng = np.random.default_rng(seed)
+    space = space_of(rng, kind)
+    assert space.vehicle is not None
+    path: Path | Trajectory = smooth_path(rng)
+    if rng.random() < 0.6:
+        path = random_motions.random_poses(rng, space.vehicle, space)
+    timing = timed(path, space)
+    if timing.status is not TimingStatus.FOUND:
+        assert timing.trajectory is None
+        assert timing.fault is not None
+        assert timing.fault.limit in timing.message
+        assert timing.fault.limit not in {"SPEED", "WHEEL_SPEED", "PATH_SPEED"}
+        return
+    assert timing.trajectory is not None
+    assert timing.profile is not None
+    assert validate(timing.trajectory, space).valid
+    assert timing.trajectory.duration > timing.profile.duration * (1 - 1e-3)
+    given_path = path_of(path)
+    # It stays on the path: every sample lies on the splines, from end to end.
+    ends = timing.trajectory.samples[[0, -1]]
+    np.testing.assert_allclose(ends, given_path.poses[[0, -1]], atol=1e-9)
+    dense = np.concatenate(
+        [p.poses_at(np.linspace(p.u[0], p.u[-1], 4000)) for p in pieces_of(given_path)]
+    )
+    some = timing.trajectory.samples[:: max(len(timing.trajectory.samples) // 50, 1)]
+    gap = np.abs(some[:, None] - dense[None]).max(axis=-1).min(axis=1)
+    assert gap.max() < 0.01
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(SEEDS, st.sampled_from(KINDS))
+def test_one_per_cent_less_time_breaks_a_limit(seed: int, kind: VehicleKind) -> None:
+    rng = np.random.default_rng(seed)
+    space, path = space_of(rng, kind), smooth_path(rng)
+    timing = timed(path, space)
+    if timing.trajectory is None or timing.profile is None:
+        return
+    if not UNJUDGED.isdisjoint(timing.profile.limit):
+        return
+    factor = timing.trajectory.duration / timing.profile.duration * 1.01
+    assert not validate(timing.trajectory.scaled(factor), space).valid
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(SEEDS, st.sampled_from(KINDS))
+def test_the_limit_that_is_named_is_at_its_bound(seed: int, kind: VehicleKind) -> None:
+    rng = np.random.default_rng(seed)
+    space, path = space_of(rng, kind), smooth_path(rng)
+    timing = time_path(path, space, grid=600, steps=100)
+    assert space.vehicle is not None
+    if timing.profile is None:
+        return
+    profile = timing.profile
+    assert profile.utilisation.max() < 1 + 1e-9
+    full = profile.utilisation > 1 - 1e-6
+    assert full.mean() > 0.9
+    # The same from the naive twin, where it can tell.
+    (piece,) = pieces_of(path)
+    ids = [wheel.id for wheel in space.vehicle.wheels]
+    sigma = int(profile.representation[0])
+    twin = naive_timing.NaiveLimits(space.vehicle, piece, sigma)
+    change = np.diff(profile.speed**2) / (2 * np.diff(profile.u))
+    calm = np.abs(np.diff(change)) < 1e-2 * np.abs(change[1:]).max()
+    inside = np.abs(profile.u[1:-1, None] - piece.u).min(axis=1) > 0.01
+    for j in rng.permutation(np.flatnonzero(calm & inside & full[1:-1]))[:4] + 1:
+        u, x, ddot = float(profile.u[j]), profile.speed[j] ** 2, change[j]
+        wheel = profile.wheel[j]
+        key = profile.limit[j], -1 if wheel is None else ids.index(wheel)
+        used = [load * x for name, load in twin.loads(u) if name == key]
+        for name, a, b, least in twin.rates(u):
+            if name == key:
+                value = a * ddot + b * x
+                used.append(abs(value) if np.isfinite(least) else value)
+        assert max(used) > 0.97, key
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(SEEDS, st.sampled_from(KINDS))
+def test_a_path_takes_as_long_backwards_in_space(seed: int, kind: VehicleKind) -> None:
+    """Time reversed, a motion has the same accelerations."""
+    rng = np.random.default_rng(seed)
+    vehicle, path = demanding_vehicle(rng, kind), smooth_path(rng)
+    load = vehicle.load
+    limits = vehicle.limits.model_copy(
+        update={"max_deceleration": vehicle.limits.max_acceleration}
+    )
+    limits = limits.model_copy(update={"max_reverse_speed": None})
+    vehicle = vehicle.model_copy(update={"limits": limits})
+    assert load is None
+    space = build_space(vehicle, Grid(40, 72), cache=False)
+    back = Path.from_poses(path.poses[::-1], reference_point=path.reference_point)
+    there, again = timed(path, space).profile, timed(back, space).profile
+    if there is None or again is None:
+        assert there is again
+        return
+    assert abs(there.duration / again.duration - 1) < 5e-3
