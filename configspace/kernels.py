@@ -27,6 +27,7 @@ from configspace.row_bounds import (
     sector_state,
     zone_state,
 )
+from configspace.threads import RELEASES_LOCK
 
 __all__ = ["BLOCKED", "FREE", "MIXED", "cell_tables"]
 
@@ -109,7 +110,7 @@ pole, wheel, each (q,)
     return out
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, nogil=RELEASES_LOCK)
 def _fill_blocks(
     edges: tuple[Array, ...],
     loads: tuple[Array, ...],

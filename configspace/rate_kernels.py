@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit, prange
 
 from configspace.bounds import GUARD, cos_range, disc_range, functional_range
+from configspace.threads import RELEASES_LOCK
 
 __all__ = ["fill_bounds"]
 
@@ -154,7 +155,7 @@ def _unsteered(
     return with_kappa + guard, with_beta + guard, _peak(bottom, top) + guard
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, nogil=RELEASES_LOCK)
 def fill_bounds(
     c: Array,
     s: Array,

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit, prange
 
 from configspace.row_bounds import BLOCKED, FREE
+from configspace.threads import RELEASES_LOCK
 
 __all__ = ["round_tables"]
 
@@ -69,7 +70,7 @@ def _inverse_root(load: float) -> float:
     return 1.0 / math.sqrt(load) if load > 0.0 else math.inf
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, nogil=RELEASES_LOCK)
 def _fill(
     nodes: Array,
     row_pad: Array,
