@@ -14,7 +14,7 @@ from rich.table import Table
 
 from configspace import PermissibleSpace, build_space, load_vehicle
 from omniplan.report import Ranking, Report
-from omniplan.trajectory import Trajectory
+from omniplan.trajectory import Trajectory, timed
 from omniplan.trajectory_io import read_trajectories
 from omniplan.wording import refusal
 
@@ -33,7 +33,7 @@ def manoeuvres() -> tuple[Trajectory, ...]:
     folders = (here / "manoeuvres", here.parent / "examples" / "manoeuvres")
     folder = next(folder for folder in folders if folder.is_dir())
     return tuple(
-        trajectory
+        timed(trajectory)
         for path in sorted(folder.glob("*.csv"))
         for trajectory in read_trajectories(path)
     )

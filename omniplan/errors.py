@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from configspace.errors import InvalidInput
+from configspace.errors import InvalidInput, OmniplanError
 
-__all__ = ["InvalidTrajectory"]
+__all__ = ["InvalidTrajectory", "NotDrivable"]
 
 
 class InvalidTrajectory(InvalidInput):
     """A trajectory that cannot be used."""
+
+
+class NotDrivable(OmniplanError):
+    """A path that a vehicle cannot drive, or that no timing could be proved for."""

@@ -2,51 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Literal, TypeAlias
+import math
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Literal, TypeAlias, get_args
 
-from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace import ClearanceMap, InvalidInput, PermissibleSpace, Problem
+from omniplan.fitness import (
+    FleetEntry,
+    FleetVehicle,
+    fleet_of,
+    requirements_of,
+    shortfalls,
+)
+from omniplan.manoeuvrability import fleet_clearance, reserve
+from omniplan.passages import passage_shortfalls
+from omniplan.path import Path
 from omniplan.report import Candidate, Ranking, Report
-from omniplan.trajectory import Trajectory
+from omniplan.requirements import NoMirroring, PassableBackwards, Requirement
+from omniplan.shortfalls import Shortfall, Unfit
+from omniplan.trace import Proved, prove
+from omniplan.trajectory import Trajectory, timed
 from omniplan.validation import validate
 
-__all__ = ["CRITERIA", "Criterion", "select"]
+__all__ = ["Criterion", "FleetVehicle", "ranked_by", "select"]
 
-Criterion: TypeAlias = Literal["duration", "margin"]
-
-CRITERIA: dict[str, Callable[[Report], float]] = {
-    # A valid report always has a fastest duration.
-    "duration": lambda report: report.fastest_duration or 0.0,
-    "margin": lambda report: -report.margin,
-}
-"""What `select` can rank by; smaller is better."""
+Criterion: TypeAlias = Literal["duration", "margin", "manoeuvrability"]
+"""What `select` can rank by."""
+Score: TypeAlias = Callable[[Report], float]
+"""A criterion of one's own; smaller is better."""
 
 
 def select(
-    trajectories: Trajectory | Iterable[Trajectory],
-    fleet: Sequence[PermissibleSpace],
-    by: str = "duration",
+    trajectories: Trajectory | Path | Iterable[Trajectory | Path],
+    fleet: Iterable[FleetEntry],
+    by: str | Score = "duration",
+    *,
+    requirements: Iterable[Requirement | str] = (),
+    allow_unreachable: bool = False,
 ) -> tuple[Ranking, ...]:
     """Rank the vehicles of a fleet for each trajectory.
+
+    Vehicles whose spaces are made of the same vehicle are judged once.
 
     Parameters
     ----------
     trajectories : Trajectory or iterable of Trajectory
-    fleet : sequence of PermissibleSpace
-        One per vehicle type; names must differ.
-    by : {"duration", "margin"}
+    fleet : iterable of FleetEntry
+        Spaces, pairs of name and space or `FleetVehicle`; names must differ.
+    by : {"duration", "margin", "manoeuvrability"} or callable
         ``duration``: how soon the vehicle can be there when it drives the whole
-        trajectory uniformly as fast as it may; ``margin``: how much it has left.
+        trajectory uniformly as fast as it may; ``margin``: how much it has left of its
+        limits; ``manoeuvrability``: by what angle it could change its direction of
+        motion at any moment, see `omniplan.manoeuvrability`. Or a function from a valid
+        `Report` to a number, smaller is better. Among equals the larger margin wins.
+    requirements : iterable of Requirement or str
+        What a vehicle must meet besides: values of `omniplan.requirements` or their
+        phrases. See `suitable` for requirements without trajectories.
+    allow_unreachable : bool
+        As for `validate`.
 
     Returns
     -------
     rankings : tuple of Ranking
-        One per trajectory, in their order.
+        One per trajectory, in their order. Every vehicle is suitable, refused with its
+        report or unfit with what it falls short of.
 
     Raises
     ------
     InvalidInput
-        If the criterion is unknown, the fleet is empty or names repeat.
+        If the criterion is unknown or gives NaN, the fleet is empty, names repeat or a
+        phrase cannot be read.
+    InvalidTrajectory
+        For a path: `fastest` gives it times.
 
     Examples
     --------
@@ -58,34 +87,161 @@ def select(
     >>> ranking.best.vehicle, ranking.refused[0].violations[0].limit
     ('mecanum', 'FIXED_WHEEL')
     """
-    if by not in CRITERIA:
-        raise InvalidInput(Problem("by", repr(by), f"one of {', '.join(CRITERIA)}"))
-    if not fleet:
-        raise InvalidInput(Problem("fleet", "empty", "at least one vehicle"))
-    names = [space.name for space in fleet]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InvalidInput(
-            Problem("fleet", f"{repeated[0]} twice", "names must differ")
-        )
-    if isinstance(trajectories, Trajectory):
+    if isinstance(trajectories, Trajectory | Path):
         trajectories = (trajectories,)
-    return tuple(_rank(trajectory, fleet, by) for trajectory in trajectories)
+    ranked = ranked_by(
+        fleet, by, requirements=requirements, allow_unreachable=allow_unreachable
+    )
+    return tuple(map(ranked, trajectories))
 
 
-def _rank(
-    trajectory: Trajectory, fleet: Sequence[PermissibleSpace], by: str
+def ranked_by(
+    fleet: Iterable[FleetEntry],
+    by: str | Score = "duration",
+    *,
+    requirements: Iterable[Requirement | str] = (),
+    allow_unreachable: bool = False,
+) -> Callable[[Trajectory | Path], Ranking]:
+    """Return the function that ranks a fleet for one trajectory after the other.
+
+    What does not depend on a trajectory is judged once, at once.
+
+    Parameters
+    ----------
+    fleet : iterable of FleetEntry
+    by : {"duration", "margin", "manoeuvrability"} or callable
+    requirements : iterable of Requirement or str
+    allow_unreachable : bool
+        As for `select`, all of them.
+
+    Raises
+    ------
+    InvalidInput
+        As `select` does.
+    """
+    if isinstance(by, str) and by not in get_args(Criterion):
+        allowed = f"one of {', '.join(get_args(Criterion))}"
+        raise InvalidInput(Problem("by", repr(by), allowed))
+    asked = requirements_of(requirements)
+    vehicles = fleet_of(fleet)
+    unfit = tuple(
+        Unfit(vehicle.id, short)
+        for vehicle in vehicles
+        if (short := shortfalls(vehicle, asked, allow_unreachable=allow_unreachable))
+    )
+    names = {one.vehicle for one in unfit}
+    fit = [vehicle for vehicle in vehicles if vehicle.id not in names]
+    question = _Question(by, asked, allow_unreachable)
+    return partial(_ranked, fit, question, unfit)
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """What is said of one vehicle type and one trajectory."""
+
+    report: Report
+    shortfalls: tuple[Shortfall, ...]
+    score: float
+    """0 where it is not asked for."""
+
+
+class _Question:
+    """Judges vehicle types for trajectories."""
+
+    def __init__(
+        self, by: str | Score, asked: tuple[Requirement, ...], allow_unreachable: bool
+    ) -> None:
+        self._by, self._asked = by, asked
+        self._allow_unreachable = allow_unreachable
+        self._watches_passage = any(
+            isinstance(one, NoMirroring | PassableBackwards) for one in asked
+        )
+        self._clearances: dict[Hashable, ClearanceMap] = {}
+
+    @property
+    def name(self) -> str:
+        """Name of the criterion."""
+        return self._by if isinstance(self._by, str) else _called(self._by)
+
+    def verdict(self, trajectory: Trajectory, space: PermissibleSpace) -> _Verdict:
+        """Return what is said of one vehicle type."""
+        allow = self._allow_unreachable
+        report = validate(trajectory, space, allow_unreachable=allow)
+        if not report.valid:
+            return _Verdict(report, (), 0.0)
+
+        @cache
+        def proved() -> Proved:
+            return prove(trajectory, space, allow_unreachable=allow)
+
+        if self._watches_passage:
+            short = passage_shortfalls(proved(), self._asked, allow_unreachable=allow)
+            if short:
+                return _Verdict(report, short, 0.0)
+        return _Verdict(report, (), self._score(report, space, proved))
+
+    def _score(
+        self, report: Report, space: PermissibleSpace, proved: Callable[[], Proved]
+    ) -> float:
+        """Return the criterion, smaller is better."""
+        if self._by == "duration":
+            # A valid report always has a fastest duration.
+            return report.fastest_duration or 0.0
+        if self._by == "margin":
+            return -report.margin
+        if isinstance(self._by, str):
+            return -reserve(proved(), self._clearance(space))
+        score = float(self._by(report))
+        if math.isnan(score):
+            given = f"{self.name} gives NaN for {report.vehicle}"
+            raise InvalidInput(Problem("by", given, "a number, smaller is better"))
+        return score
+
+    def _clearance(self, space: PermissibleSpace) -> ClearanceMap:
+        key = _type_of(space)
+        if key not in self._clearances:
+            self._clearances[key] = fleet_clearance(space)
+        return self._clearances[key]
+
+
+def _ranked(
+    fleet: Iterable[FleetVehicle],
+    question: _Question,
+    unfit: tuple[Unfit, ...],
+    motion: Trajectory | Path,
 ) -> Ranking:
-    reports = [validate(trajectory, space) for space in fleet]
-    suitable = [
-        Candidate(report.vehicle, CRITERIA[by](report), report)
-        for report in reports
-        if report.valid
-    ]
-    suitable.sort(key=lambda candidate: (candidate.score, candidate.vehicle))
+    trajectory = timed(motion)
+    verdicts: dict[Hashable, _Verdict] = {}
+    suitable: list[Candidate] = []
+    refused: list[Report] = []
+    short: list[Unfit] = []
+    for vehicle in fleet:
+        key = _type_of(vehicle.space)
+        if key not in verdicts:
+            verdicts[key] = question.verdict(trajectory, vehicle.space)
+        verdict = verdicts[key]
+        report = replace(verdict.report, vehicle=vehicle.id)
+        if verdict.shortfalls:
+            short.append(Unfit(vehicle.id, verdict.shortfalls))
+        elif report.valid:
+            suitable.append(Candidate(vehicle.id, verdict.score, report))
+        else:
+            refused.append(report)
+    suitable.sort(key=lambda one: (one.score, -one.report.margin, one.vehicle))
     return Ranking(
         trajectory=trajectory.name,
-        criterion=by,
+        criterion=question.name,
         suitable=tuple(suitable),
-        refused=tuple(report for report in reports if not report.valid),
+        refused=tuple(refused),
+        unfit=(*unfit, *short),
     )
+
+
+def _type_of(space: PermissibleSpace) -> Hashable:
+    """Return what spaces of one vehicle type have in common."""
+    # Formulas and table may answer differently.
+    return space.header.fingerprint, space.vehicle is None
+
+
+def _called(score: Score) -> str:
+    return str(getattr(score, "__name__", type(score).__name__))

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from configspace import PermissibleSpace, classify, singular_points
+from configspace import (
+    PermissibleSpace,
+    classify,
+    manoeuvrability_index,
+    singular_points,
+)
 from configspace.kernels import BLOCKED, MIXED
 from configspace.topology import summary
 
@@ -28,12 +34,15 @@ def inspect_space(space: PermissibleSpace) -> dict[str, Any]:
         ``mobility``; with a known vehicle ``class`` (δ_m, δ_s, δ_M) and its name,
         ``icr`` (how the centre of rotation may move) and ``singular_points``;
         ``kappa_g`` (1/m), ``reference`` (m); shares of the configurations that are
-        permitted, blocked, mixed and of certain components; v_max (m/s) straight ahead,
-        backwards and sideways, ω on the spot (rad/s), and the smallest radii of K (m)
-        to the left and right with β as straight ahead, None for straight on only.
+        permitted, blocked, mixed and of certain components; ``manoeuvrability``: the
+        bounds of `manoeuvrability_index` and the speed they refer to (m/s); v_max (m/s)
+        straight ahead, backwards and sideways, ω on the spot (rad/s), and the smallest
+        radii of K (m) to the left and right with β as straight ahead, None for straight
+        on only.
     """
     ahead = space.line_beta or 0.0
     hangs = summary(space)
+    index = manoeuvrability_index(space)
     facts: dict[str, Any] = {
         "name": space.name,
         "mobility": _mobility(space),
@@ -46,6 +55,7 @@ def inspect_space(space: PermissibleSpace) -> dict[str, Any]:
         "mixed_share": float((space.tables.state == MIXED).mean()),
         "components": hangs.n_certain,
         "unreachable_share": hangs.unreachable,
+        "manoeuvrability": asdict(index),
         "speed_ahead": float(space.v_max(0.0, ahead)),
         "speed_backwards": float(space.v_max(0.0, ahead, reverse=True)),
         "speed_sideways": float(space.v_max(0.0, ahead + math.pi / 2)),
@@ -115,6 +125,7 @@ def inspection_table(name: str, facts: dict[str, Any]) -> Table:
         ("… in components", f"{facts['components']}"),
         ("… not connected with straight on", f"{facts['unreachable_share']:.2%}"),
         ("configurations blocked", f"{facts['blocked_share']:.2%}"),
+        ("manoeuvrability index", _index_text(facts["manoeuvrability"])),
         ("v_max straight ahead", f"{facts['speed_ahead']:.3f} m/s"),
         ("v_max straight back", f"{facts['speed_backwards']:.3f} m/s"),
         ("v_max sideways", f"{facts['speed_sideways']:.3f} m/s"),
@@ -131,6 +142,15 @@ def inspection_table(name: str, facts: dict[str, Any]) -> Table:
     for label, text in lines:
         table.add_row(label, text)
     return table
+
+
+def _index_text(index: dict[str, Any]) -> str:
+    """Return both shares, from below, and what they are shares of."""
+    of = "all motions" if index["dimension"] == 2 else "the motions along its line"
+    return (
+        f"{index['share']:.2%} of {of}\n"
+        f"{index['speed_share']:.2%} weighted by speed, {index['v_ref']:.3f} m/s is 1"
+    )
 
 
 def _singular_text(points: list[dict[str, Any]]) -> str:

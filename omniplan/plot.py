@@ -1,29 +1,45 @@
 """Pictures of trajectories and verdicts.
 
-The one module of the package that imports matplotlib; nothing imports it before a
-picture is wanted. `configspace.plot.save_figure` writes the figures.
+The module to import for pictures; matplotlib is imported here and in the ``plot_…``
+modules that draw the parts, never before a picture is wanted.
+`configspace.plot.save_figure` writes the figures.
 """
 
 from __future__ import annotations
 
 import math
-import textwrap
+import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Polygon, Rectangle
+from matplotlib.patches import Polygon
 
-from configspace import InvalidInput, Problem
-from omniplan.report import Ranking, Report
+from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace.plot_style import save_figure
+from omniplan.plot_data import Drive, drive_of, marks_of
+from omniplan.plot_map import draw_on_space
+from omniplan.plot_path import draw_way
+from omniplan.plot_style import GOAL, PATH, START, legend_below, new_figure, plain
+from omniplan.plot_time import draw_times, panels_of
+from omniplan.plot_verdicts import plot_verdicts
+from omniplan.report import Report
 from omniplan.trajectory import Trajectory
 
-__all__ = ["plot_manoeuvres", "plot_trajectory", "plot_verdicts"]
+__all__ = [
+    "plot_manoeuvres",
+    "plot_on_space",
+    "plot_report",
+    "plot_times",
+    "plot_trajectory",
+    "plot_verdicts",
+    "plot_way",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -33,8 +49,127 @@ Outline: TypeAlias = Sequence[tuple[float, float]]
 CUSP = math.radians(80)
 """A larger turn of the direction of travel from step to step is a cusp or corner."""
 
-_START, _GOAL, _PATH = "tab:blue", "tab:orange", "black"
-_FREE, _REFUSED = "#cdeccd", "#a86a6a"
+
+def plot_report(
+    report: Report,
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    folder: str | Path,
+    *,
+    allow_unreachable: bool = False,
+) -> tuple[Path, ...]:
+    """Draw a verdict and write it: the way, the map of v_max, and all over time.
+
+    Parameters
+    ----------
+    report : Report
+        Of `validate`; its violations are numbered in all three pictures.
+    trajectory : Trajectory
+    space : PermissibleSpace
+        Wheels are drawn if its vehicle is known.
+    folder : str or Path
+        Created where it does not exist.
+    allow_unreachable : bool
+        As for the `validate` that gave the report.
+
+    Returns
+    -------
+    paths : tuple of Path
+        ``TRAJECTORY-VEHICLE-way.png``, ``…-space.png`` and ``…-times.png``.
+
+    Raises
+    ------
+    InvalidInput
+        If a file cannot be written.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        given = f"{folder}: {error.strerror}"
+        raise InvalidInput(Problem("folder", given, "must be writable")) from error
+    drive = drive_of(trajectory, space, allow_unreachable=allow_unreachable)
+    stem = re.sub(r"[^\w.-]+", "_", f"{trajectory.name}-{report.vehicle}")[:150]
+    paths = []
+    for name, figure in (
+        ("way", plot_way(drive, report, trajectory)),
+        ("space", plot_on_space(drive, report)),
+        ("times", plot_times(drive, report)),
+    ):
+        paths.append(folder / f"{stem}-{name}.png")
+        save_figure(figure, paths[-1])
+    return tuple(paths)
+
+
+def plot_way(drive: Drive, report: Report, trajectory: Trajectory) -> Figure:
+    """Draw the way over the ground with footprint and steered wheels.
+
+    Parameters
+    ----------
+    drive : Drive
+        Of `omniplan.plot_data.drive_of`.
+    report : Report
+    trajectory : Trajectory
+        The way of its reference point is drawn, coloured by margin.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, marks = new_figure(9.0, 6.2), marks_of(report)
+    keys = draw_way(figure.add_subplot(), drive, trajectory.reference_point, marks)
+    figure.suptitle(_headline(report), fontsize="medium")
+    legend_below(figure, keys, marks)
+    return figure
+
+
+def plot_on_space(drive: Drive, report: Report) -> Figure:
+    """Draw what is driven on the permissible space of the vehicle.
+
+    Parameters
+    ----------
+    drive : Drive
+    report : Report
+
+    Returns
+    -------
+    Figure
+    """
+    figure, marks = new_figure(8.6, 6.4), marks_of(report)
+    keys = draw_on_space(figure.add_subplot(), drive, marks)
+    figure.suptitle(_headline(report), fontsize="medium")
+    legend_below(figure, keys, marks)
+    return figure
+
+
+def plot_times(drive: Drive, report: Report) -> Figure:
+    """Draw speeds, steering angles and margin over time, with their limits.
+
+    Parameters
+    ----------
+    drive : Drive
+    report : Report
+
+    Returns
+    -------
+    Figure
+    """
+    n_panels, marks = panels_of(drive), marks_of(report)
+    figure = new_figure(9.6, 1.2 + 1.75 * n_panels + 0.2 * len(marks))
+    panels = list(figure.subplots(n_panels, 1, sharex=True))
+    draw_times(panels, drive, report, marks)
+    figure.suptitle(_headline(report), fontsize="medium")
+    figure.align_ylabels(panels)
+    legend_below(figure, [], marks)
+    return figure
+
+
+def _headline(report: Report) -> str:
+    verdict = "permitted" if report.valid else "not permitted"
+    name = f"{plain(report.trajectory, 40)} by {plain(report.vehicle, 40)}"
+    # Where a limit has no ratio to its bound the margin says nothing more.
+    left = f", margin {report.margin:.1%}" if report.margin > -10 else ""
+    return f"{name}: {verdict}{left}"
 
 
 def plot_trajectory(
@@ -61,11 +196,11 @@ def plot_trajectory(
     InvalidInput
         If the trajectory is not made of poses.
     """
-    figure = _new_figure(7.0, 5.5)
+    figure = new_figure(7.0, 5.5)
     axes = figure.add_subplot()
     keys = _draw_trajectory(axes, trajectory, footprint, outlines)
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.set_title(f"{_plain(trajectory.name)}, {trajectory.duration:.3g} s")
+    axes.set_title(f"{plain(trajectory.name)}, {trajectory.duration:.3g} s")
     figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -101,7 +236,7 @@ def plot_manoeuvres(
         )
     columns = min(len(trajectories), 3 if len(trajectories) != 4 else 2)
     rows = math.ceil(len(trajectories) / columns)
-    figure = _new_figure(4.2 * columns, 3.7 * rows + 0.4)
+    figure = new_figure(4.2 * columns, 3.7 * rows + 0.4)
     keys: dict[object, Artist] = {}
     for place, (trajectory, footprint) in enumerate(
         zip(trajectories, footprints, strict=True)
@@ -109,7 +244,7 @@ def plot_manoeuvres(
         axes = figure.add_subplot(rows, columns, place + 1)
         for key in _draw_trajectory(axes, trajectory, footprint, 9):
             keys.setdefault(key.get_label(), key)
-        axes.set_title(_plain(trajectory.name, 36))
+        axes.set_title(plain(trajectory.name, 36))
         if place + columns >= len(trajectories):
             axes.set_xlabel("x [m]")
         if place % columns == 0:
@@ -118,93 +253,6 @@ def plot_manoeuvres(
         handles=list(keys.values()), loc="outside lower center", ncols=4, frameon=False
     )
     return figure
-
-
-def plot_verdicts(rankings: Sequence[Ranking]) -> Figure:
-    """Draw who can drive what: vehicles down, trajectories across.
-
-    A light cell says how fast the vehicle can be, a hatched one which limit it breaks
-    first and with which wheel. The best vehicle of a trajectory has a thick frame.
-
-    Parameters
-    ----------
-    rankings : sequence of Ranking
-        One for each trajectory, as `select` gives them.
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    InvalidInput
-        If there is no ranking, or none has a vehicle.
-    """
-    cells = verdicts(rankings)
-    vehicles = sorted({vehicle for vehicle, _ in cells})
-    if not vehicles:
-        raise InvalidInput(Problem("rankings", "no vehicle", "at least one is needed"))
-    names = [ranking.trajectory for ranking in rankings]
-    figure = _new_figure(2.0 + 1.75 * len(names), 1.5 + 0.75 * len(vehicles))
-    axes = figure.add_subplot()
-    for row, vehicle in enumerate(vehicles):
-        for column, ranking in enumerate(rankings):
-            report = cells.get((vehicle, column))
-            is_best = ranking.best is not None and ranking.best.vehicle == vehicle
-            _draw_cell(axes, column, row, report, is_best)
-    axes.set(
-        xlim=(-0.5, len(names) - 0.5),
-        ylim=(len(vehicles) - 0.5, -0.5),
-        xticks=range(len(names)),
-        yticks=range(len(vehicles)),
-    )
-    # Spaces let a long name go over several lines.
-    spaced = [name.replace("_", " ").replace("-", " ") for name in names]
-    axes.set_xticklabels([textwrap.fill(_plain(name), 18) for name in spaced])
-    axes.set_yticklabels([_plain(vehicle) for vehicle in vehicles])
-    axes.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
-    axes.spines[:].set_visible(False)
-    keys = [
-        Patch(fc=_FREE, ec="black", label="can, fastest duration"),
-        Patch(fc=_REFUSED, ec="white", hatch="///", label="cannot, first limit"),
-        Patch(fc=_FREE, ec="black", lw=2.5, label="best"),
-    ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
-    return figure
-
-
-def verdicts(rankings: Sequence[Ranking]) -> dict[tuple[str, int], Report]:
-    """Return the report of every cell, by vehicle and number of the ranking."""
-    return {
-        (report.vehicle, column): report
-        for column, ranking in enumerate(rankings)
-        for report in (
-            *(candidate.report for candidate in ranking.suitable),
-            *ranking.refused,
-        )
-    }
-
-
-def verdict_text(report: Report) -> str:
-    """Return what a cell of the verdicts says.
-
-    Parameters
-    ----------
-    report : Report
-
-    Returns
-    -------
-    str
-        The fastest duration, or the limit that is broken first and its wheel.
-    """
-    if report.valid:
-        fastest = report.fastest_duration
-        return f"{report.duration if fastest is None else fastest:.3g} s"
-    first = report.headline
-    if first is None:
-        return "refused"
-    limit = first.limit.lower().replace("_", " ").replace("steer ", "steering ")
-    return f"{limit}\n{_plain(first.wheel or 'vehicle', 22)}"
 
 
 def outlines_along(trajectory: Trajectory, footprint: Outline) -> FloatArray:
@@ -248,18 +296,6 @@ def cusps(trajectory: Trajectory) -> IntArray:
     return np.asarray(moving[1:][np.abs(turn) > CUSP], dtype=np.int64)
 
 
-def _plain(name: str, longest: int = 60) -> str:
-    """Return a name that is not too long and that is not taken for a formula."""
-    short = name if len(name) <= longest else f"{name[: longest - 1]}…"
-    return short.replace("$", r"\$")
-
-
-def _new_figure(width: float, height: float) -> Figure:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _draw_trajectory(
     axes: Axes, trajectory: Trajectory, footprint: Outline | None, outlines: int
 ) -> list[Artist]:
@@ -277,9 +313,9 @@ def _draw_trajectory(
     chosen = _spread(trajectory, outlines)
     if footprint:
         _draw_outlines(axes, outlines_along(trajectory, footprint), chosen)
-    keys += axes.plot(x, y, color=_PATH, lw=1.5, zorder=4, label="reference point")
+    keys += axes.plot(x, y, color=PATH, lw=1.5, zorder=4, label="reference point")
     size = _extent(trajectory, footprint)
-    ends = ((0, _START, "o", "start"), (-1, _GOAL, "s", "goal"))
+    ends = ((0, START, "o", "start"), (-1, GOAL, "s", "goal"))
     for index, colour, marker, label in ends:
         keys += axes.plot(
             x[index],
@@ -292,7 +328,7 @@ def _draw_trajectory(
             label=label,
         )
     for index in chosen:
-        _draw_heading(axes, trajectory.samples[index], 0.09 * size, _PATH, 1.0)
+        _draw_heading(axes, trajectory.samples[index], 0.09 * size, PATH, 1.0)
     for index, colour, _, _ in ends:
         _draw_heading(axes, trajectory.samples[index], 0.16 * size, colour, 2.5)
     sharp = cusps(trajectory)
@@ -321,7 +357,7 @@ def _draw_outlines(axes: Axes, corners: FloatArray, chosen: IntArray) -> None:
     for index in chosen:
         grey = 0.8 - 0.45 * index / len(corners)
         axes.add_patch(Polygon(corners[index], fc="none", ec=str(grey), lw=0.9))
-    for index, colour, style in ((0, _START, "-"), (-1, _GOAL, "--")):
+    for index, colour, style in ((0, START, "-"), (-1, GOAL, "--")):
         axes.add_patch(Polygon(corners[index], fc=colour, ec="none", alpha=0.15))
         axes.add_patch(
             Polygon(corners[index], fc="none", ec=colour, lw=2, ls=style, zorder=3)
@@ -354,27 +390,3 @@ def _extent(trajectory: Trajectory, footprint: Outline | None) -> float:
     if footprint:
         points = outlines_along(trajectory, footprint).reshape(-1, 2)
     return float(np.ptp(points, axis=0).max()) or 1.0
-
-
-def _draw_cell(
-    axes: Axes, column: int, row: int, report: Report | None, is_best: bool
-) -> None:
-    corner = (column - 0.47, row - 0.44)
-    if report is None:
-        axes.text(column, row, "not asked", ha="center", va="center", color="0.5")
-        return
-    cell = Rectangle(corner, 0.94, 0.88, fc=_FREE, ec="black")
-    if not report.valid:
-        cell.set(facecolor=_REFUSED, edgecolor="white", hatch="///")
-    cell.set_linewidth(2.5 if is_best else 0.5)
-    axes.add_patch(cell)
-    axes.text(
-        column,
-        row,
-        verdict_text(report),
-        ha="center",
-        va="center",
-        fontsize="large" if report.valid else "small",
-        fontweight="bold" if is_best else "normal",
-        bbox=None if report.valid else {"fc": "white", "ec": "none", "pad": 1.5},
-    )

@@ -13,9 +13,8 @@ twists (vx, vy, ω)      linear in the body twist
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +22,20 @@ import numpy.typing as npt
 from configspace import Problem, Vehicle, vehicle_from_data
 from configspace.angles import wrap
 from omniplan.errors import InvalidTrajectory
+from omniplan.path import Path
+from omniplan.samples import (
+    MAX_VALUE,
+    checked_name,
+    checked_point,
+    invalid_row,
+    locked,
+    numbers,
+    reject_jump,
+    reject_outside,
+    unwrapped,
+)
 
-__all__ = ["Trajectory"]
+__all__ = ["Trajectory", "timed"]
 
 FloatArray = npt.NDArray[np.float64]
 Form: TypeAlias = Literal["poses", "twists", "omni_curve"]
@@ -40,10 +51,6 @@ MAX_TIME = 1e10
 """Largest |t|, s: room for the seconds since 1970 and far more."""
 MIN_STEP = 1e-6
 """Least time from sample to sample, s."""
-MAX_VALUE = 1e6
-"""Largest size of any other value: m, m/s, rad or rad/s."""
-MAX_HEADING_STEP = math.pi / 2 + 1e-9
-"""A larger turn from sample to sample is ambiguous, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +68,18 @@ class Trajectory:
     vehicle: Vehicle | None = None
     """The vehicle whose κ_n and v_n are meant; only for ``omni_curve``."""
 
+    @overload
+    @classmethod
+    def from_poses(
+        cls,
+        t: None,
+        poses: npt.ArrayLike,
+        *,
+        name: str = "trajectory",
+        reference_point: tuple[float, float] = (0.0, 0.0),
+    ) -> Path: ...
+
+    @overload
     @classmethod
     def from_poses(
         cls,
@@ -69,13 +88,23 @@ class Trajectory:
         *,
         name: str = "trajectory",
         reference_point: tuple[float, float] = (0.0, 0.0),
-    ) -> Trajectory:
-        """Return the trajectory through timed poses.
+    ) -> Trajectory: ...
+
+    @classmethod
+    def from_poses(
+        cls,
+        t: npt.ArrayLike | None,
+        poses: npt.ArrayLike,
+        *,
+        name: str = "trajectory",
+        reference_point: tuple[float, float] = (0.0, 0.0),
+    ) -> Trajectory | Path:
+        """Return the trajectory through timed poses, or the path through poses.
 
         Parameters
         ----------
-        t : (n,) float, s
-            Strictly increasing, n ≥ 2.
+        t : (n,) float, s, or None
+            Strictly increasing, n ≥ 2. None: a `Path`; `omniplan.fastest` times it.
         poses : (n, 3) float, m, m, rad
             (x, y, θ) of the reference point. Headings may be wrapped; from sample to
             sample the vehicle turns by at most a quarter turn.
@@ -93,12 +122,13 @@ class Trajectory:
         >>> Trajectory.from_poses([0, 1, 2], [[0, 0, 0], [1, 0, 0], [2, 0, 0]]).duration
         2.0
         """
+        if t is None:
+            return Path.from_poses(poses, name=name, reference_point=reference_point)
         times, samples = _checked(name, t, poses, COLUMNS["poses"])
-        step = wrap(np.diff(samples[:, 2]))
-        _reject_jump(name, "theta", "the heading", step)
-        samples[1:, 2] = samples[0, 2] + np.cumsum(step)
-        point = _point(name, reference_point)
-        return cls(name, "poses", _locked(times), _locked(samples), point)
+        reject_jump(name, "theta", "the heading", wrap(np.diff(samples[:, 2])))
+        samples[:, 2] = unwrapped(samples[:, 2])
+        point = checked_point(name, reference_point)
+        return cls(name, "poses", locked(times), locked(samples), point)
 
     @classmethod
     def from_twists(
@@ -126,8 +156,8 @@ class Trajectory:
             With the number of the first offending row.
         """
         times, samples = _checked(name, t, twists, COLUMNS["twists"])
-        point = _point(name, reference_point)
-        return cls(name, "twists", _locked(times), _locked(samples), point)
+        point = checked_point(name, reference_point)
+        return cls(name, "twists", locked(times), locked(samples), point)
 
     @classmethod
     def from_omni_curve(
@@ -162,7 +192,7 @@ class Trajectory:
         """
         labels = COLUMNS["omni_curve"]
         columns = [
-            _numbers(name, (label,), column)
+            numbers(name, (label,), column)
             for label, column in zip(labels, (kappa_n, beta, v_n), strict=True)
         ]
         if len({column.shape for column in columns}) > 1:
@@ -176,7 +206,7 @@ class Trajectory:
         for column, limit, allowed in ((0, 2.0, "[-2, 2]"), (2, 1.0, "[-1, 1]")):
             outside = np.flatnonzero(np.abs(samples[:, column]) > limit)
             if outside.size:
-                raise _invalid(
+                raise invalid_row(
                     name,
                     int(outside[0]),
                     COLUMNS["omni_curve"][column],
@@ -186,17 +216,15 @@ class Trajectory:
         step = wrap(np.diff(samples[:, 1]))
         half = np.flatnonzero(np.abs(step) > math.pi - 1e-9)
         if half.size:
-            raise _invalid(
+            raise invalid_row(
                 name,
                 int(half[0]) + 1,
                 "beta",
                 "turns by half a turn",
                 "the way round must be clear: less than half a turn per row",
             )
-        samples[1:, 1] = samples[0, 1] + np.cumsum(step)
-        return cls(
-            name, "omni_curve", _locked(times), _locked(samples), vehicle=vehicle
-        )
+        samples[:, 1] = unwrapped(samples[:, 1])
+        return cls(name, "omni_curve", locked(times), locked(samples), vehicle=vehicle)
 
     @property
     def duration(self) -> float:
@@ -230,8 +258,8 @@ class Trajectory:
         return Trajectory(
             self.name,
             self.form,
-            _locked(t),
-            _locked(samples),
+            locked(t),
+            locked(samples),
             self.reference_point,
             self.vehicle,
         )
@@ -265,8 +293,8 @@ class Trajectory:
         return Trajectory(
             self.name,
             self.form,
-            _locked(np.insert(t, row + 1, self.t[row] + seconds)),
-            _locked(np.insert(self.samples, row + 1, self.samples[row], axis=0)),
+            locked(np.insert(t, row + 1, self.t[row] + seconds)),
+            locked(np.insert(self.samples, row + 1, self.samples[row], axis=0)),
             self.reference_point,
         )
 
@@ -298,11 +326,7 @@ class Trajectory:
             raise InvalidTrajectory(
                 Problem("trajectory", type(data).__name__, "a mapping is needed")
             )
-        name = data.get("name", "trajectory")
-        if not isinstance(name, str) or not name or len(name) > 200:
-            raise InvalidTrajectory(
-                Problem("name", repr(name)[:60], "a text of 1 to 200 characters")
-            )
+        name = checked_name(data.get("name", "trajectory"))
         known = {"name", "t", "reference_point", "vehicle", *COLUMNS}
         unknown = sorted(str(key) for key in set(data) - known)
         forms = [form for form in COLUMNS if form in data]
@@ -317,61 +341,18 @@ class Trajectory:
             times, samples = _checked(name, data["t"], data[form], COLUMNS[form])
             kappa_n, beta, v_n = samples.T
             return cls.from_omni_curve(times, kappa_n, beta, v_n, vehicle, name=name)
-        point = _point(name, data.get("reference_point", (0.0, 0.0)))
+        point = checked_point(name, data.get("reference_point", (0.0, 0.0)))
         build = cls.from_poses if form == "poses" else cls.from_twists
-        return build(data["t"], data[form], name=name, reference_point=point)
-
-
-def _numbers(name: str, labels: tuple[str, ...], values: npt.ArrayLike) -> FloatArray:
-    """Return a new float array, or raise unless all values are numbers.
-
-    `labels` name the columns of a table, or the one of a list.
-    """
-    try:
-        array = np.array(values)
-    except (TypeError, ValueError) as error:
-        raise InvalidTrajectory(
-            Problem(name, "rows of different lengths", f"{', '.join(labels)} in each")
-        ) from error
-    if array.size and array.dtype.kind not in "fiu":
-        raise InvalidTrajectory(_not_a_number(name, labels, array))
-    return array.astype(np.float64)
-
-
-def _not_a_number(
-    name: str, labels: tuple[str, ...], array: npt.NDArray[np.generic]
-) -> Problem:
-    """Return where the first value stands that is not a number."""
-    for place, value in np.ndenumerate(array):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or abs(value) > sys.float_info.max:
-            known = len(place) > 1 and place[1] < len(labels)
-            label = labels[place[1]] if known else ", ".join(labels)
-            where = f"{name}: row {place[0]}, {label}" if place else f"{name}: {label}"
-            return Problem(where, repr(value)[:60], "must be a number")
-    return Problem(name, "values that are not numbers", "numbers only")
-
-
-def _point(name: str, value: Any) -> tuple[float, float]:
-    if isinstance(value, list | tuple) and len(value) == 2:
-        x, y = _numbers(name, ("reference_point",), value)
-        if abs(x) <= 100 and abs(y) <= 100:
-            return float(x), float(y)
-    raise InvalidTrajectory(
-        Problem(
-            f"{name}: reference_point", repr(value)[:60], "two finite numbers, in m"
-        )
-    )
+        times = numbers(name, ("t",), data["t"])
+        return build(times, data[form], name=name, reference_point=point)
 
 
 def _checked(
     name: str, t: npt.ArrayLike, samples: npt.ArrayLike, columns: tuple[str, str, str]
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and samples as new float arrays, or raise with the row."""
-    if not 0 < len(str(name)) <= 200 or str(name).startswith("#"):
-        allowed = "a text of 1 to 200 characters that does not start with #"
-        raise InvalidTrajectory(Problem("name", repr(name)[:60], allowed))
-    times, values = _numbers(name, ("t",), t), _numbers(name, columns, samples)
+    name = checked_name(name)
+    times, values = numbers(name, ("t",), t), numbers(name, columns, samples)
     if times.ndim != 1 or values.shape != (times.size, 3):
         raise InvalidTrajectory(
             Problem(
@@ -384,22 +365,13 @@ def _checked(
         raise InvalidTrajectory(
             Problem(name, f"{times.size} sample(s)", "at least two are needed")
         )
-    for column, label, limit in (
-        (times, "t", MAX_TIME),
-        *(
-            (column, label, MAX_VALUE)
-            for column, label in zip(values.T, columns, strict=True)
-        ),
-    ):
-        bad = np.flatnonzero(~(np.abs(column) <= limit))
-        if bad.size:
-            row = int(bad[0])
-            allowed = f"must be finite, at most {limit:g} in size"
-            raise _invalid(name, row, label, f"{column[row]}", allowed)
+    reject_outside(name, times, "t", MAX_TIME)
+    for column, label in zip(values.T, columns, strict=True):
+        reject_outside(name, column, label, MAX_VALUE)
     back = np.flatnonzero(np.diff(times) < MIN_STEP)
     if back.size:
         row = int(back[0]) + 1
-        raise _invalid(
+        raise invalid_row(
             name,
             row,
             "t",
@@ -409,25 +381,20 @@ def _checked(
     return times, values
 
 
-def _reject_jump(name: str, column: str, what: str, step: FloatArray) -> None:
-    jump = np.flatnonzero(np.abs(step) > MAX_HEADING_STEP)
-    if jump.size:
-        row = int(jump[0])
-        raise _invalid(
-            name,
-            row + 1,
-            column,
-            f"{what} turns by {math.degrees(step[row]):.1f}° from row {row}",
-            "at most 90° per row, or the way round is not clear",
+def timed(motion: Trajectory | Path) -> Trajectory:
+    """Return a trajectory as it is.
+
+    Raises
+    ------
+    InvalidTrajectory
+        For a path: only a motion with times can be judged.
+    """
+    if isinstance(motion, Path):
+        raise InvalidTrajectory(
+            Problem(
+                motion.name,
+                "a path, which has no times",
+                "omniplan.fastest(path, space) finds them",
+            )
         )
-
-
-def _invalid(
-    name: str, row: int, column: str, given: str, allowed: str
-) -> InvalidTrajectory:
-    return InvalidTrajectory(Problem(f"{name}: row {row}, {column}", given, allowed))
-
-
-def _locked(values: FloatArray) -> FloatArray:
-    values.flags.writeable = False
-    return values
+    return motion

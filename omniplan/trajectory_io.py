@@ -1,168 +1,91 @@
-"""Trajectories as CSV files, in long form.
+"""Reading and writing trajectories and paths: CSV, Parquet, VDA 5050 orders.
 
-The header names the columns: ``t`` and one of ``x, y, theta``, ``vx, vy, omega`` or
-``kappa_n, beta, v_n``; with a column ``trajectory`` one file holds many. SI units and
-radians; lines that start with ``#`` are comments.
+The end of the file's name says which: ``.parquet``, ``.json`` (VDA 5050), else CSV.
+The columns are those of `omniplan.trajectory_table`.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
-from pathlib import Path
+from pathlib import Path as FilePath
 
-from configspace import InvalidInput, Problem, Vehicle
+from configspace import Problem, Vehicle
 from omniplan.errors import InvalidTrajectory
-from omniplan.trajectory import COLUMNS, Form, Trajectory
+from omniplan.path import Path
+from omniplan.trajectory import Trajectory
+from omniplan.trajectory_table import columns_of, trajectories_of
 
 __all__ = ["read_trajectories", "write_trajectories"]
 
 
 def read_trajectories(
-    path: str | Path, vehicle: Vehicle | None = None
-) -> tuple[Trajectory, ...]:
-    """Read the trajectories of a CSV file, in the order in which they first appear.
+    path: str | FilePath, vehicle: Vehicle | None = None
+) -> tuple[Trajectory | Path, ...]:
+    """Read trajectories or paths, in the order in which they first appear.
 
     Parameters
     ----------
     path : str or Path
+        A ``.parquet`` file, a ``.json`` file with VDA 5050 orders, or a CSV file.
     vehicle : Vehicle, optional
         The vehicle whose parameters a file of ``kappa_n, beta, v_n`` holds.
+
+    Returns
+    -------
+    tuple of Trajectory or Path
+        Paths where the file has no times.
 
     Raises
     ------
     InvalidTrajectory
-        If the file cannot be read or has mistakes; with the line of the file.
+        If the file cannot be read or has mistakes; with the line, the row and column,
+        or the JSON path.
     """
-    path = Path(path)
-    try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidTrajectory(
-            Problem(f"{path}", str(error), "a readable UTF-8 CSV file")
-        ) from error
-    # Line numbers are kept: comments become empty rows, which the reader skips.
-    text = ["" if line.lstrip().startswith("#") else line for line in lines]
-    reader = csv.reader(text)
-    groups: dict[str, list[tuple[int, list[float]]]] = {}
-    try:
-        header = next((row for row in reader if row), None)
-        if header is None:
-            raise InvalidTrajectory(Problem(f"{path}", "no header", "a line of names"))
-        form, columns = _form(path, [name.strip() for name in header])
-        for row in reader:
-            if row:
-                name, values = _row(path, reader.line_num, row, header, columns)
-                groups.setdefault(name, []).append((reader.line_num, values))
-    except csv.Error as error:
-        raise InvalidTrajectory(
-            Problem(f"{path}: line {reader.line_num}", str(error), "a CSV file")
-        ) from error
-    if not groups:
-        raise InvalidTrajectory(Problem(f"{path}", "no rows", "at least two rows"))
-    return tuple(
-        _trajectory(path, name, form, rows, vehicle) for name, rows in groups.items()
-    )
+    path = FilePath(path)
+    match path.suffix.lower():
+        case ".json":
+            from omniplan.vda5050 import read_orders
+
+            return read_orders(path)
+        case ".parquet":
+            from omniplan.trajectory_parquet import read_parquet
+
+            return trajectories_of(read_parquet(path), vehicle)
+        case _:
+            from omniplan.trajectory_csv import read_csv
+
+            return trajectories_of(read_csv(path), vehicle)
 
 
-def _form(path: Path, header: list[str]) -> tuple[Form, list[int]]:
-    """Return the form of the samples and where its columns stand, t first."""
-    repeated = sorted({name for name in header if header.count(name) > 1})
-    known = {"trajectory", "t"}.union(*COLUMNS.values())
-    unknown = [name for name in header if name not in known]
-    forms = [form for form, names in COLUMNS.items() if set(names) <= set(header)]
-    if "t" not in header:
-        given = "no column t (a path without time)"
-    elif repeated:
-        given = f"column {repeated[0]} twice"
-    elif unknown:
-        given = f"unknown column {unknown[0]!r}"
-    elif len(forms) != 1 or len(header) > 5:
-        given = f"columns {', '.join(header)}"
-    else:
-        return forms[0], [header.index(name) for name in ("t", *COLUMNS[forms[0]])]
-    allowed = "; or ".join("t, " + ", ".join(names) for names in COLUMNS.values())
-    raise InvalidTrajectory(
-        Problem(f"{path}: header", given, f"[trajectory,] {allowed}")
-    )
+def write_trajectories(
+    path: str | FilePath, trajectories: Iterable[Trajectory | Path]
+) -> None:
+    """Write trajectories of one form, or paths, to a Parquet or a CSV file.
 
+    Parquet keeps every digit; CSV keeps nine, and all of a time.
 
-def _row(
-    path: Path, line: int, row: list[str], header: list[str], columns: list[int]
-) -> tuple[str, list[float]]:
-    if len(row) != len(header):
-        raise InvalidTrajectory(
-            Problem(f"{path}: line {line}", f"{len(row)} values", f"{len(header)}")
-        )
-    values = []
-    for column in columns:
-        try:
-            values.append(float(row[column]))
-        except ValueError as error:
-            raise InvalidTrajectory(
-                Problem(
-                    f"{path}: line {line}, {header[column].strip()}",
-                    repr(row[column])[:60],
-                    "a number",
-                )
-            ) from error
-    names = [name.strip() for name in header]
-    if "trajectory" in names:
-        return row[names.index("trajectory")].strip() or path.stem, values
-    return path.stem, values
-
-
-def _trajectory(
-    path: Path,
-    name: str,
-    form: Form,
-    rows: list[tuple[int, list[float]]],
-    vehicle: Vehicle | None,
-) -> Trajectory:
-    t = [values[0] for _, values in rows]
-    samples = [values[1:] for _, values in rows]
-    try:
-        if form == "poses":
-            return Trajectory.from_poses(t, samples, name=name)
-        if form == "twists":
-            return Trajectory.from_twists(t, samples, name=name)
-        if vehicle is None:
-            raise InvalidTrajectory(
-                Problem(name, "kappa_n, beta, v_n of no vehicle", "name their vehicle")
-            )
-        kappa_n, beta, v_n = zip(*samples, strict=True)
-        return Trajectory.from_omni_curve(t, kappa_n, beta, v_n, vehicle, name=name)
-    except InvalidInput as error:
-        first, last = rows[0][0], rows[-1][0]
-        raise InvalidTrajectory(
-            error.problems, subject=f"{path} (lines {first} to {last})"
-        ) from error
-
-
-def write_trajectories(path: str | Path, trajectories: Iterable[Trajectory]) -> None:
-    """Write trajectories of one form to a CSV file.
+    Parameters
+    ----------
+    path : str or Path
+        Ends in ``.parquet``, or is a CSV file.
+    trajectories : iterable of Trajectory or Path
 
     Raises
     ------
     InvalidInput
         If there are none, or their forms differ.
+    InvalidTrajectory
+        If the name of the file ends in ``.json``.
     """
-    trajectories = tuple(trajectories)
-    forms = sorted({trajectory.form for trajectory in trajectories})
-    if len(forms) != 1:
-        raise InvalidInput(
-            Problem("trajectories", f"forms {forms}", "exactly one form per file")
-        )
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["trajectory", "t", *COLUMNS[trajectories[0].form]])
-        for trajectory in trajectories:
-            for t, sample in zip(trajectory.t, trajectory.samples, strict=True):
-                cells = (f"{value:.9g}" for value in sample)
-                writer.writerow([trajectory.name, _time(float(t)), *cells])
+    path = FilePath(path)
+    if path.suffix.lower() == ".json":
+        raise InvalidTrajectory(Problem(f"{path}", "JSON", ".csv or .parquet"))
+    table = columns_of(tuple(trajectories))
+    if path.suffix.lower() == ".parquet":
+        from omniplan.trajectory_parquet import write_parquet
 
+        write_parquet(path, *table)
+    else:
+        from omniplan.trajectory_csv import write_csv
 
-def _time(t: float) -> str:
-    """Return a time with all its digits; seconds since 1970 need more than nine."""
-    short = f"{t:.9g}"
-    return short if float(short) == t else repr(t)
+        write_csv(path, *table)

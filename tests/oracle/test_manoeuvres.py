@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import runpy
 import sys
 from collections.abc import Callable
@@ -18,7 +19,8 @@ FOLDER = EXAMPLES / "manoeuvres"
 FLEET = ("ackermann", "differential", "ift-four-steered", "mecanum")
 OMNI = {"ift-four-steered", "mecanum"}
 WHO_CAN = {
-    "crab-corner": OMNI,
+    # Straight into an arc: the wheels of the others would have to swing too suddenly.
+    "crab-corner": {"mecanum"},
     "docking": set(FLEET),
     "forward-stop-sideways": OMNI,
     "parking-ackermann": set(FLEET),
@@ -62,11 +64,21 @@ def test_parking_sideways_needs_the_wheels_to_turn_at_rest(space_of: SpaceOf) ->
     report = report_on("parking-sideways", space_of("ift-four-steered"))
     (violation,) = report.violations
     assert violation.limit == "RECONFIGURATION"
-    # A quarter turn at 180°/s, where the trajectory has only a cusp.
-    assert violation.value == pytest.approx(0.5, abs=0.01)
+    # A quarter turn at 180°/s and 720°/s², where the trajectory has only a cusp.
+    assert violation.value == pytest.approx(0.5 + 0.25, abs=0.01)
     assert violation.bound < 0.2
     assert violation.t == pytest.approx(3.0, abs=0.1)
     assert {advice.kind for advice in report.advice} == {"slow_down", "dwell"}
+
+
+def test_the_crab_corner_asks_for_too_sudden_steering(space_of: SpaceOf) -> None:
+    report = report_on("crab-corner", space_of("ift-four-steered"))
+    assert {v.limit for v in report.violations} == {"STEER_ACCELERATION"}
+    assert report.headline is not None
+    # By differences of the steering angles along the splines: 1026.9°/s².
+    assert report.headline.value == pytest.approx(math.radians(1027), rel=1e-3)
+    (advice,) = report.advice
+    assert advice.value == pytest.approx(math.sqrt(720 / 1026.9), rel=2e-3)
 
 
 def test_a_quick_wide_curve_is_too_fast_for_the_others(space_of: SpaceOf) -> None:

@@ -13,6 +13,7 @@ from configspace import Grid, PermissibleSpace, build_space
 from configspace.testing import VehicleKind
 from omniplan import Path, Timing, TimingStatus, Trajectory, time_path, validate
 from omniplan.path_motion import path_of, pieces_of
+from omniplan.timing_solver import TimingProblem
 
 KINDS: tuple[VehicleKind, ...] = ("mecanum", "omni", "steered", "offset", "turntable")
 ALL: tuple[VehicleKind, ...] = (
@@ -23,7 +24,6 @@ ALL: tuple[VehicleKind, ...] = (
     "synchro",
 )
 SEEDS = st.integers(0, 10**6)
-UNJUDGED = {"STEER_ACCELERATION"}
 
 
 def space_of(rng: np.random.Generator, kind: VehicleKind) -> PermissibleSpace:
@@ -34,7 +34,7 @@ def timed(path: Path | Trajectory, space: PermissibleSpace) -> Timing:
     return time_path(path, space, grid=200, steps=250)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=8, deadline=None, derandomize=True)
 @given(SEEDS, st.sampled_from(ALL))
 def test_what_is_found_is_proved_and_what_is_not_says_where(
     seed: int, kind: VehicleKind
@@ -68,7 +68,7 @@ def test_what_is_found_is_proved_and_what_is_not_says_where(
     assert gap.max() < 0.01
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=4, deadline=None, derandomize=True)
 @given(SEEDS, st.sampled_from(KINDS))
 def test_one_per_cent_less_time_breaks_a_limit(seed: int, kind: VehicleKind) -> None:
     rng = np.random.default_rng(seed)
@@ -76,13 +76,11 @@ def test_one_per_cent_less_time_breaks_a_limit(seed: int, kind: VehicleKind) -> 
     timing = timed(path, space)
     if timing.trajectory is None or timing.profile is None:
         return
-    if not UNJUDGED.isdisjoint(timing.profile.limit):
-        return
     factor = timing.trajectory.duration / timing.profile.duration * 1.01
     assert not validate(timing.trajectory.scaled(factor), space).valid
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=4, deadline=None, derandomize=True)
 @given(SEEDS, st.sampled_from(KINDS))
 def test_the_limit_that_is_named_is_at_its_bound(seed: int, kind: VehicleKind) -> None:
     rng = np.random.default_rng(seed)
@@ -115,23 +113,22 @@ def test_the_limit_that_is_named_is_at_its_bound(seed: int, kind: VehicleKind) -
         assert max(used) > 0.97, key
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(SEEDS, st.sampled_from(KINDS))
-def test_a_path_takes_as_long_backwards_in_space(seed: int, kind: VehicleKind) -> None:
-    """Time reversed, a motion has the same accelerations."""
+def test_a_path_takes_as_long_the_other_way(seed: int, kind: VehicleKind) -> None:
+    """Time reversed, a motion has the same accelerations, and v_s its other sign."""
     rng = np.random.default_rng(seed)
     vehicle, path = demanding_vehicle(rng, kind), smooth_path(rng)
-    load = vehicle.load
     limits = vehicle.limits.model_copy(
-        update={"max_deceleration": vehicle.limits.max_acceleration}
+        update={
+            "max_deceleration": vehicle.limits.max_acceleration,
+            "max_reverse_speed": None,
+        }
     )
-    limits = limits.model_copy(update={"max_reverse_speed": None})
     vehicle = vehicle.model_copy(update={"limits": limits})
-    assert load is None
-    space = build_space(vehicle, Grid(40, 72), cache=False)
     back = Path.from_poses(path.poses[::-1], reference_point=path.reference_point)
-    there, again = timed(path, space).profile, timed(back, space).profile
-    if there is None or again is None:
-        assert there is again
-        return
-    assert abs(there.duration / again.duration - 1) < 5e-3
+    durations = [
+        TimingProblem(pieces_of(one), vehicle, 1000).solve([0], [sigma])[0].duration
+        for one, sigma in ((path, 1), (back, -1))
+    ]
+    assert abs(durations[0] / durations[1] - 1) < 2e-3

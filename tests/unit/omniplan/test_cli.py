@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from omniplan import cli
+from omniplan.requirements import PHRASES
 
 MANOEUVRES = Path(__file__).parents[3] / "examples" / "manoeuvres"
 Capture = pytest.CaptureFixture[str]
@@ -93,9 +94,50 @@ def test_select_ranks_and_refuses(capsys: Capture) -> None:
     arguments += ["--fleet", "ift-four-steered", "mecanum"]
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
-    assert "1. mecanum: at best" in out
+    assert "│ 1. │ mecanum │" in out
     assert "no ift-four-steered: wheel" in out
     assert "advice: stand still for 0.50 s at t = 3.00 s" in out
+
+
+def test_select_says_what_is_unfit(capsys: Capture) -> None:
+    arguments = ["select", manoeuvre("docking"), "--by", "manoeuvrability"]
+    arguments += ["--fleet", "agv-1=mecanum", "agv-2=mecanum", "ackermann"]
+    arguments += ["--require", "crab 90 deg at 0.5 m/s", "--require", "no mirroring"]
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "│ agv-1   │" in out
+    assert "│ agv-2   │" in out
+    assert "180.0°" in out
+    line = "unfit ackermann: crab 90 deg at 0.5 m/s: to the left, 0.5 m/s asked, "
+    assert line + "nothing offered [STEER_RANGE, FIXED_WHEEL of wheel front" in out
+
+
+def test_requirements_need_no_trajectory(capsys: Capture) -> None:
+    asked = ["--require", "turn-on-the-spot"]
+    fleet = ["--fleet", "mecanum", "ackermann"]
+    assert cli.main(["select", *fleet, *asked]) == 0
+    assert "mecanum" in capsys.readouterr().out
+    answer = run_json(capsys, "select", *fleet, *asked)
+    assert isinstance(answer, dict)
+    assert answer["suitable"] == ["mecanum"]
+    assert answer["unfit"][0]["shortfalls"][0]["limit"] == "STEER_RANGE"
+    assert cli.main(["select", *fleet, "--require", "payload 10 kg"]) == 1
+    assert "the vehicle does not say" in capsys.readouterr().out
+
+
+def test_select_needs_a_trajectory_or_a_requirement(capsys: Capture) -> None:
+    assert cli.main(["select", "--fleet", "mecanum"]) == 2
+    assert "no trajectory and no --require" in capsys.readouterr().err
+    assert cli.main(["select", "--fleet", "mecanum", "--require", "fly"]) == 2
+    assert "radius R m [at V m/s]" in capsys.readouterr().err
+
+
+def test_help_of_select_lists_the_requirements(capsys: Capture) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["select", "--help"])
+    out = capsys.readouterr().out
+    for phrase in PHRASES:  # argparse breaks lines anywhere
+        assert "".join(phrase.split()) in "".join(out.split())
 
 
 def test_exported_sheet_judges_without_the_vehicle(
@@ -120,7 +162,8 @@ def test_inspect_shows_the_figures_of_the_paper(
 def test_check_draws_trajectories(tmp_path: Path) -> None:
     arguments = ["check", manoeuvre("docking"), "--vehicle", "mecanum"]
     assert cli.main([*arguments, "--plot", str(tmp_path)]) == 0
-    assert (tmp_path / "docking.png").stat().st_size > 5_000
+    for kind in ("way", "space", "times"):
+        assert (tmp_path / f"docking-mecanum-{kind}.png").stat().st_size > 5_000
 
 
 def test_catalog_and_schema_print_json(capsys: Capture) -> None:
@@ -176,7 +219,7 @@ def test_serve_answers_queries_until_it_is_stopped(capsys: Capture) -> None:
             query = ["query", "check", turn, "--vehicle", "mecanum", *to_it]
             assert cli.main(query) == 0
             assert cli.main(["query", "select", turn, *to_it]) == 0
-            assert "1. mecanum" in capsys.readouterr().out
+            assert "│ mecanum │" in capsys.readouterr().out
         finally:
             server.terminate()
         assert server.wait(timeout=20) == 0

@@ -4,7 +4,10 @@ import pytest
 
 import configspace
 from configspace import InvalidInput, PermissibleSpace
-from omniplan import Trajectory, select
+from omniplan import FleetVehicle, Ranking, Report, Trajectory, select
+from omniplan import fleet as fleet_module
+from omniplan.fitness import FleetEntry
+from omniplan.validation import validate
 
 SpaceOf = Callable[[str], PermissibleSpace]
 NAMES = ("mecanum", "differential", "ackermann", "ift-four-steered")
@@ -99,3 +102,91 @@ def test_an_empty_fleet_and_names_that_repeat_are_refused(
         select(ahead(), [])
     with pytest.raises(InvalidInput, match="mecanum twice"):
         select(ahead(), [fleet[0], fleet[1], fleet[0]])
+
+
+def test_vehicles_of_one_type_are_judged_once(
+    fleet: list[PermissibleSpace], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mecanum, differential = fleet[:2]
+    judged: list[str] = []
+
+    def counted(trajectory: Trajectory, space: PermissibleSpace, **how: bool) -> Report:
+        judged.append(space.name)
+        return validate(trajectory, space, allow_unreachable=how["allow_unreachable"])
+
+    monkeypatch.setattr(fleet_module, "validate", counted)
+    again = configspace.build_space(
+        configspace.load_vehicle("mecanum"), mecanum.grid, cache=False
+    )
+    many: list[FleetEntry] = [
+        ("m1", mecanum),
+        FleetVehicle("m2", again, 50.0),
+        differential,
+    ]
+    (ranking,) = select(aside(), many)
+    assert sorted(judged) == ["differential", "mecanum"]
+    assert [c.vehicle for c in ranking.suitable] == ["m1", "m2"]
+    assert [c.report.vehicle for c in ranking.suitable] == ["m1", "m2"]
+    assert [report.vehicle for report in ranking.refused] == ["differential"]
+
+
+def test_a_sheet_and_its_vehicle_are_two_types(fleet: list[PermissibleSpace]) -> None:
+    sheet = configspace.parse_space(configspace.dump_space(fleet[0]))
+    (ranking,) = select(ahead(), [("known", fleet[0]), ("sheet", sheet)])
+    known, published = ranking.suitable
+    assert (known.vehicle, published.vehicle) == ("known", "sheet")
+    assert published.report.not_judged
+
+
+def test_what_is_unfit_is_not_judged_and_says_why(
+    fleet: list[PermissibleSpace],
+) -> None:
+    (ranking,) = select(
+        ahead(), fleet, requirements=["crab 90 deg", "speed 1.1 m/s", "no mirroring"]
+    )
+    assert [c.vehicle for c in ranking.suitable] == ["mecanum"]
+    assert ranking.refused == ()
+    unfit = {one.vehicle: one.shortfalls for one in ranking.unfit}
+    assert set(unfit) == {"differential", "ackermann", "ift-four-steered"}
+    assert [one.limit for one in unfit["differential"]] == [
+        "FIXED_WHEEL",
+        "FIXED_WHEEL",
+        "WHEEL_SPEED",
+    ]
+    assert Ranking.from_dict(ranking.to_dict()) == ranking
+
+
+def test_a_way_that_is_not_passable_backwards_is_unfit(
+    fleet: list[PermissibleSpace],
+) -> None:
+    fast = ahead(speed=0.9)  # the ackermann vehicle drives 0.8 m/s backwards
+    (ranking,) = select(fast, fleet, requirements=["passable backwards"])
+    (one,) = ranking.unfit
+    assert one.vehicle == "ackermann"
+    assert one.shortfalls[0].limit == "REVERSE_SPEED"
+    assert len(ranking.suitable) == 3
+
+
+def test_a_criterion_of_ones_own_ranks(fleet: list[PermissibleSpace]) -> None:
+    def slowest(report: Report) -> float:
+        return report.speed_factor
+
+    (ranking,) = select(ahead(), fleet, by=slowest)
+    factors = [candidate.report.speed_factor for candidate in ranking.suitable]
+    assert factors == sorted(factors)
+    assert ranking.criterion == "slowest"
+    with pytest.raises(InvalidInput, match="gives NaN for"):
+        select(ahead(), fleet, by=lambda _: float("nan"))
+
+
+def test_among_equals_the_larger_margin_wins(fleet: list[PermissibleSpace]) -> None:
+    (ranking,) = select(ahead(), fleet, by=lambda _: 0.0)
+    margins = [candidate.report.margin for candidate in ranking.suitable]
+    assert margins == sorted(margins, reverse=True)
+
+
+def test_requirements_that_cannot_be_read_are_refused(
+    fleet: list[PermissibleSpace],
+) -> None:
+    with pytest.raises(InvalidInput, match=r"requirements\[0\], phrase: 'fly'"):
+        select(ahead(), fleet, requirements=["fly"])

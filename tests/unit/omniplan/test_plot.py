@@ -15,10 +15,10 @@ from omniplan.plot import (
     plot_manoeuvres,
     plot_trajectory,
     plot_verdicts,
-    verdict_text,
-    verdicts,
 )
+from omniplan.plot_verdicts import verdict_text, verdicts
 from omniplan.report import Candidate, Ranking, Report, Violation
+from omniplan.shortfalls import Shortfall, Unfit
 from omniplan.trajectory import Trajectory
 
 FOOTPRINT = ((0.35, 0.2), (-0.35, 0.2), (-0.35, -0.2), (0.35, -0.2))
@@ -232,7 +232,9 @@ def test_refusal_without_a_violation_is_said_all_the_same() -> None:
 def test_verdicts_has_a_cell_for_every_report(rankings: list[Ranking]) -> None:
     cells = verdicts(rankings)
     assert len(cells) == 4 + 2 + 4
-    assert cells["ackermann", 1].violations[1].limit == "SINGULAR"
+    refused = cells["ackermann", 1]
+    assert isinstance(refused, Report)
+    assert refused.violations[1].limit == "SINGULAR"
     assert ("mecanum", 1) not in cells
 
 
@@ -266,3 +268,13 @@ def test_names_are_text_even_if_they_look_like_formulas(tmp_path: Path) -> None:
 def test_verdicts_of_nobody_are_an_error() -> None:
     with pytest.raises(InvalidInput, match="no vehicle"):
         plot_verdicts([])
+
+
+def test_who_is_unfit_has_a_cell_with_the_requirement(
+    rankings: list[Ranking],
+) -> None:
+    short = Shortfall("crab 90 deg", "to the left", 0.0, 0.0, "m/s", "SINGULAR", None)
+    unfit = Unfit("tricycle", (short,))
+    assert verdict_text(unfit) == "unfit:\ncrab 90 deg"
+    figure = plot_verdicts([replace(rankings[0], unfit=(unfit,))])
+    assert "unfit:\ncrab 90 deg" in texts(figure)

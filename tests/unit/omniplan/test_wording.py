@@ -19,7 +19,7 @@ UNITS = {
     "REVERSE_SPEED": "m/s", "YAW_RATE": "rad/s", "LATERAL_ACCELERATION": "m/s²",
     "FIXED_WHEEL": "rad", "STEER_RATE": "rad/s", "WHEEL_ACCELERATION": "m/s²",
     "ACCELERATION": "m/s²", "DECELERATION": "m/s²", "RECONFIGURATION": "s",
-    "V_MAX": "1",
+    "STEER_ACCELERATION": "rad/s²", "V_MAX": "1",
 }  # fmt: skip
 """Every limit that a verdict names, with its unit."""
 
