@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from configspace import PermissibleSpace
 from configspace.sheet import fingerprint
-from omniplan.motion import Motion
+from omniplan.motion import Motion, PoseMotion
 from omniplan.rows import Judge, Tolerances
 from omniplan.sheet_judge import SheetJudge
 from omniplan.trajectory import Trajectory
@@ -28,5 +28,9 @@ def judge_for(space: PermissibleSpace, motion: Motion, tolerances: Tolerances) -
     if space.vehicle is None:
         return SheetJudge(space, tolerances, is_own=motion.is_own)
     return VehicleJudge(
-        space.vehicle, tolerances, is_own=motion.is_own, has_rates=motion.has_rates
+        space.vehicle,
+        tolerances,
+        is_own=motion.is_own,
+        has_rates=motion.has_rates,
+        has_swing=isinstance(motion, PoseMotion),
     )

@@ -24,9 +24,18 @@ from scipy.interpolate import CubicSpline
 from configspace import Vehicle, exact_v_max
 from configspace.exact import active_rows
 from configspace.limits import rows_of
+from omniplan.swing import Directions, Swing, directions_of_legs, factored
 from omniplan.trajectory import Trajectory
 
-__all__ = ["Enclosure", "Intervals", "Motion", "motion_of"]
+__all__ = [
+    "Enclosure",
+    "Intervals",
+    "Motion",
+    "PoseMotion",
+    "motion_of",
+    "spline",
+    "stops_of",
+]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -88,6 +97,8 @@ class Enclosure:
     """Bound on the factor on the twist over the part, ≥ 0."""
     sign: FloatArray
     """Sign of v_s of the configuration that is meant (omni_curve), else 1."""
+    swing: Swing | None = None
+    """How directions swing; None where the twist may bend without bound."""
 
 
 class Motion(Protocol):
@@ -178,8 +189,14 @@ class PoseMotion:
 
     Between two stops position and heading are C²; at a stop they start anew with zero
     speed, as a C² spline through a cusp would swing around it.
+
+    Attributes `t` (n,), the coefficients `position` and `heading` (4, n - 1) of the
+    cubics in the time since each sample, highest power first, and the described
+    `point` tell all of it.
     """
 
+    rest: npt.NDArray[np.bool_] | None = None
+    """(2, n - 1) whether intervals start and end at rest; None: nowhere."""
     is_own = False
     has_rates = True
     interpolation = (
@@ -187,46 +204,45 @@ class PoseMotion:
     )
 
     def __init__(self, t: FloatArray, samples: FloatArray, point: complex) -> None:
-        self._t = t
-        self._point = point
-        self._position = np.zeros((4, len(t) - 1), dtype=complex)
-        self._heading = np.zeros((4, len(t) - 1))
+        self.t = t
+        self.point = point
+        self.position = np.zeros((4, len(t) - 1), dtype=complex)
+        self.heading = np.zeros((4, len(t) - 1))
         stop = stops_of(samples)
         stop[0] |= starts_at_rest(t, samples)
         stop[-1] |= starts_at_rest(-t[::-1], samples[::-1])
+        self.rest = np.stack([stop[:-1], stop[1:]])
         bounds = sorted({0, len(t) - 1, *np.flatnonzero(stop).tolist()})
         for first, last in itertools.pairwise(bounds):
             run = slice(first, last + 1)
             ends = bool(stop[first]), bool(stop[last])
             part = slice(first, last)
-            x, y = (_spline(t[run], samples[run, i], *ends) for i in (0, 1))
-            self._position[:, part] = x + 1j * y
-            self._heading[:, part] = _spline(t[run], samples[run, 2], *ends)
+            x, y = (spline(t[run], samples[run, i], *ends) for i in (0, 1))
+            self.position[:, part] = x + 1j * y
+            self.heading[:, part] = spline(t[run], samples[run, 2], *ends)
 
     def intervals(self) -> Intervals:
         """Return the intervals between the samples."""
-        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+        return Intervals(np.arange(len(self.t) - 1), self.t[:-1], self.t[1:])
 
     def poses_at(self, t: FloatArray) -> FloatArray:
         """Return the poses at times t, (n, 3)."""
-        knot = np.clip(
-            np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2
-        )
-        p = _polynomial(self._position, knot, t - self._t[knot])[0]
-        heading = _polynomial(self._heading, knot, t - self._t[knot])[0]
+        knot = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        p = _polynomial(self.position, knot, t - self.t[knot])[0]
+        heading = _polynomial(self.heading, knot, t - self.t[knot])[0]
         return np.stack([p.real, p.imag, heading.real], axis=-1)
 
     def _at(
         self, knot: IntArray, t: FloatArray
     ) -> tuple[ComplexArray, FloatArray, ComplexArray, FloatArray, FloatArray]:
         """Return v, ω, v̇, ω̇ and what bounds the third derivatives at times t."""
-        _, p1, p2, _ = _polynomial(self._position, knot, t - self._t[knot])
+        _, p1, p2, _ = _polynomial(self.position, knot, t - self.t[knot])
         h0, h1, h2, _ = (
-            x.real for x in _polynomial(self._heading, knot, t - self._t[knot])
+            x.real for x in _polynomial(self.heading, knot, t - self.t[knot])
         )
         turn = np.exp(-1j * h0)
-        v = turn * p1 - 1j * h1 * self._point
-        v_dot = turn * (p2 - 1j * h1 * p1) - 1j * h2 * self._point
+        v = turn * p1 - 1j * h1 * self.point
+        v_dot = turn * (p2 - 1j * h1 * p1) - 1j * h2 * self.point
         sizes = np.stack([np.abs(p1), np.abs(p2), np.abs(h1), np.abs(h2)])
         return v, h1, v_dot, h2, sizes
 
@@ -236,21 +252,37 @@ class PoseMotion:
         v0, o0, vd0, od0, at0 = self._at(parts.knot, parts.t0)
         v1, o1, vd1, od1, at1 = self._at(parts.knot, parts.t1)
         p1, p2, h1, h2 = np.maximum(at0, at1)
-        p3 = 6 * np.abs(self._position[0, parts.knot])
-        h3 = 6 * np.abs(self._heading[0, parts.knot])
+        p3 = 6 * np.abs(self.position[0, parts.knot])
+        h3 = 6 * np.abs(self.heading[0, parts.knot])
         # The second derivative is linear, so its ends bound it; the first one bends.
         p1 = p1 + dt**2 / 8 * p3
         h1 = h1 + dt**2 / 8 * h3
         # d²/dt² (e^{-jθ} p') = e^{-jθ} (p''' - 2jθ'p'' - jθ''p' - θ'²p')
-        v_ddot = p3 + 2 * h1 * p2 + h2 * p1 + h1**2 * p1 + h3 * abs(self._point)
+        v_ddot = p3 + 2 * h1 * p2 + h2 * p1 + h1**2 * p1 + h3 * abs(self.point)
         one = np.ones_like(dt)
-        return Enclosure(
-            dt, v0, v1, o0, o1, vd0, vd1, od0, od1, v_ddot, h3, one, one, one, one
+        ends = v0, v1, o0, o1, vd0, vd1, od0, od1
+        swing = self._swing(parts)
+        return Enclosure(dt, *ends, v_ddot, h3, one, one, one, one, swing)
+
+    def _swing(self, parts: Intervals) -> Swing:
+        k = parts.knot
+        start, span = self.t[k], self.t[k + 1] - self.t[k]
+        rest = None if self.rest is None else self.rest[:, k]
+        return Swing(
+            dt=parts.t1 - parts.t0,
+            h=np.stack([parts.t0 - start, parts.t1 - start]),
+            speed=factored(self.position[:, k], span, rest),
+            turn=factored(self.heading[:, k], span, rest),
+            heading=self.heading[:, k],
+            point=self.point,
         )
 
 
 class TwistMotion:
-    """Body twists, linear in time between the samples."""
+    """Body twists, linear in time between the samples.
+
+    Attributes `t` (n,), `v` (n,) and `omega` (n,) tell all of it.
+    """
 
     is_own = False
     has_rates = True
@@ -258,23 +290,23 @@ class TwistMotion:
 
     def __init__(self, t: FloatArray, samples: FloatArray, point: complex) -> None:
         t, samples = _with_zero_crossings(t, samples)
-        self._t = t
-        self._omega = samples[:, 2]
-        self._v = samples[:, 0] + 1j * samples[:, 1] - 1j * self._omega * point
+        self.t = t
+        self.omega = samples[:, 2]
+        self.v = samples[:, 0] + 1j * samples[:, 1] - 1j * self.omega * point
 
     def intervals(self) -> Intervals:
         """Return the intervals between the samples."""
-        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+        return Intervals(np.arange(len(self.t) - 1), self.t[:-1], self.t[1:])
 
     def enclose(self, parts: Intervals) -> Enclosure:
         """Return an enclosure of every part; it has no excess."""
         k = parts.knot
-        span = self._t[k + 1] - self._t[k]
-        v_dot = (self._v[k + 1] - self._v[k]) / span
-        omega_dot = (self._omega[k + 1] - self._omega[k]) / span
-        f0, f1 = ((t - self._t[k]) / span for t in (parts.t0, parts.t1))
-        v0, v1 = ((1 - f) * self._v[k] + f * self._v[k + 1] for f in (f0, f1))
-        o0, o1 = ((1 - f) * self._omega[k] + f * self._omega[k + 1] for f in (f0, f1))
+        span = self.t[k + 1] - self.t[k]
+        v_dot = (self.v[k + 1] - self.v[k]) / span
+        omega_dot = (self.omega[k + 1] - self.omega[k]) / span
+        f0, f1 = ((t - self.t[k]) / span for t in (parts.t0, parts.t1))
+        v0, v1 = ((1 - f) * self.v[k] + f * self.v[k + 1] for f in (f0, f1))
+        o0, o1 = ((1 - f) * self.omega[k] + f * self.omega[k + 1] for f in (f0, f1))
         zero, one = np.zeros_like(span), np.ones_like(span)
         return Enclosure(
             parts.t1 - parts.t0,
@@ -366,6 +398,28 @@ class OmniCurveMotion:
             dt, v0, v1, o0, o1, vd0, vd1, od0, od1, v_ddot, zero, *scale, factor
         )
 
+    def directions(self, parts: Intervals) -> Directions:
+        """Return how directions swing along the parts, whatever v_n is."""
+        k = parts.knot
+        rate = np.diff(self._samples, axis=0)[k] / np.diff(self._t)[k][:, None]
+        since = np.stack([parts.t0, parts.t1]) - self._t[k]
+        kappa_n, beta = (self._samples[k, i] + since * rate[:, i] for i in (0, 1))
+        middle = (self._samples[k, 0] + self._samples[k + 1, 0]) / 2
+        gentle, side = np.abs(middle) < 1, np.where(middle < 0, -1.0, 1.0)
+        return directions_of_legs(
+            parts.t1 - parts.t0,
+            np.where(gentle, 1.0, 2 - np.abs(kappa_n)),
+            np.where(gentle, kappa_n, side),
+            beta,
+            (
+                np.where(gentle, 0.0, -side * rate[:, 0]),
+                np.where(gentle, rate[:, 0], 0.0),
+                rate[:, 1],
+            ),
+            self._kappa_g,
+            self._reference,
+        )
+
 
 def _speeds(
     owner: Vehicle,
@@ -411,7 +465,7 @@ def _speeds(
 End: TypeAlias = Literal["not-a-knot"] | tuple[Literal[1, 2], float]
 
 
-def _spline(t: FloatArray, values: FloatArray, rest0: bool, rest1: bool) -> FloatArray:
+def spline(t: FloatArray, values: FloatArray, rest0: bool, rest1: bool) -> FloatArray:
     """Return cubic coefficients (4, n - 1); at rest where asked."""
     # Without a fourth sample there is no third derivative to keep: natural ends.
     free: End = "not-a-knot" if len(t) > 3 else (2, 0.0)

@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from omniplan.faults import Undrivable
 from omniplan.shortfalls import Unfit
 from omniplan.wording import describe
 
@@ -24,10 +25,11 @@ class Violation:
 
     limit: str
     """Which limit: a name of `configspace.Reason`, or ``REVERSE_SPEED``,
-    ``STEER_RATE``, ``WHEEL_ACCELERATION``, ``ACCELERATION``, ``DECELERATION``,
-    ``RECONFIGURATION``; the last is a standstill too short to turn or unwind the
-    wheels, value and bound in s. ``UNREACHABLE`` is a piece between standstills that is
-    permitted but in another component of the space than straight ahead."""
+    ``STEER_RATE``, ``STEER_ACCELERATION``, ``WHEEL_ACCELERATION``, ``ACCELERATION``,
+    ``DECELERATION``, ``RECONFIGURATION``; the last is a standstill too short to turn or
+    unwind the wheels, value and bound in s. ``UNREACHABLE`` is a piece between
+    standstills that is permitted but in another component of the space than straight
+    ahead."""
     wheel: str | None
     """Id of the wheel; None for the vehicle as a whole."""
     value: float | None
@@ -86,9 +88,12 @@ class Advice:
     """What would make the trajectory valid; it was checked by validating again."""
 
     kind: str
-    """``slow_down``: drive it slower all along; ``dwell``: stand still longer."""
+    """``slow_down``: drive it slower all along; ``dwell``: stand still longer;
+    ``side_slip``: at the most telling violation move in another direction, at the same
+    curvature and speed (that was validated as a steady motion, not along the way)."""
     value: float
-    """``slow_down``: the factor on the speed, below 1; ``dwell``: seconds in all."""
+    """``slow_down``: the factor on the speed, below 1; ``dwell``: seconds in all;
+    ``side_slip``: the nearest permitted side-slip angle β, rad."""
     text: str
 
 
@@ -153,7 +158,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Who can drive a trajectory, best first, and why the others cannot."""
+    """Who can drive a trajectory, best first, and why the others cannot.
+
+    Of a path the reports are about each vehicle's own fastest timing.
+    """
 
     trajectory: str
     criterion: str
@@ -161,6 +169,8 @@ class Ranking:
     refused: tuple[Report, ...]
     unfit: tuple[Unfit, ...] = ()
     """Vehicles that do not meet the requirements, and by how much."""
+    undrivable: tuple[Undrivable, ...] = ()
+    """Of a path: vehicles for which it has no timing, and why."""
 
     @property
     def best(self) -> Candidate | None:

@@ -73,7 +73,9 @@ class WindingWheel:
     largest: float
     """rad"""
     rate: float
-    """Largest steering rate, rad/s; infinite where none is given."""
+    """Largest steering rate at rest, rad/s; infinite where nothing bounds it."""
+    acceleration: float = math.inf
+    """Largest steering acceleration, rad/s²; likewise."""
 
     @property
     def middle(self) -> float:

@@ -221,9 +221,11 @@ class _Changes:
         if key not in self._known:
             parts, judge = self._parts, self._judge
             last, first = self._pieces[i].last, self._pieces[i + 1].first
+            t0, t1 = self.rest(i)
             self._known[key] = self._changer.change(
                 _configuration(parts, last, before, judge, at_end=True),
                 _configuration(parts, first, after, judge, at_end=False),
+                t1 - t0,
             )
         return self._known[key]
 

@@ -19,11 +19,12 @@ from configspace.omni_curve import curvature_of_ratio
 from configspace.vehicle import SteerableWheel
 from omniplan.chords import Chord
 from omniplan.judge import is_own, judge_for
-from omniplan.motion import Motion, motion_of
+from omniplan.motion import Motion, PoseMotion, motion_of
 from omniplan.path import Path
 from omniplan.proof import Parts, Proof
 from omniplan.report import Advice, Report
 from omniplan.rows import Judge, Tolerances
+from omniplan.side_step import side_step
 from omniplan.standstill import Choice, choose_configurations
 from omniplan.trajectory import Trajectory, timed
 from omniplan.violations import (
@@ -33,12 +34,12 @@ from omniplan.violations import (
 )
 from omniplan.winding import straddling, wound
 
-__all__ = ["Tolerances", "followed", "validate"]
+__all__ = ["Tolerances", "followed", "judged", "validate"]
 
 MIN_FACTOR, MAX_FACTOR = 0.01, 100.0
 """Slower or faster than this nothing is promised."""
-FACTOR_STEPS = 6
-"""How often a factor that turns out too large is approached."""
+FACTOR_STEP = 1.01
+"""How near to a factor that is too large a proved one comes at least, as a ratio."""
 STOP_HALVINGS = 12
 """How finely it is told when a wheel runs into a stop."""
 
@@ -92,7 +93,7 @@ def validate(
     True
     """
     ask = partial(
-        _judged,
+        judged,
         space=space,
         tolerances=tolerances or Tolerances(),
         allow_unreachable=allow_unreachable,
@@ -107,16 +108,27 @@ def validate(
     advice = (
         *_slow_down(report, trajectory),
         *_dwell(report, trajectory, ask),
+        *side_step(report, trajectory, space, ask),
     )
     return replace(report, advice=advice)
 
 
-def _judged(
+def judged(
     trajectory: Trajectory,
     space: PermissibleSpace,
     tolerances: Tolerances,
     allow_unreachable: bool,
 ) -> Report:
+    """Judge a timed trajectory once, without advice and proved speed factor.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    space : PermissibleSpace
+    tolerances : Tolerances
+    allow_unreachable : bool
+        As for `validate`.
+    """
     motion = motion_of(trajectory, is_own=is_own(trajectory, space))
     judge = judge_for(space, motion, tolerances)
     proof = Proof(motion, judge, tolerances)
@@ -234,8 +246,9 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
         yield "change rates (not in the data sheet)"
         return
     steered = [w for w in vehicle.wheels if isinstance(w, SteerableWheel)]
-    if any(w.max_steering_acceleration_deg is not None for w in steered):
-        yield "max_steering_acceleration_deg"
+    swings = any(w.max_steering_acceleration_deg is not None for w in steered)
+    if swings and not isinstance(motion, PoseMotion):
+        yield "max_steering_acceleration_deg (samples other than poses bend suddenly)"
     if motion.has_rates:
         return
     if any(getattr(w, "max_acceleration", None) is not None for w in vehicle.wheels):
@@ -252,8 +265,10 @@ def _proved_factor(
 ) -> float:
     """Return a factor on the speed that validating again has proved, 0 if none.
 
-    What the utilisations promise is tried first. It may be too much, as what counts as
-    standing and as slip does not scale with the speed; then it is approached.
+    What the utilisations promise is tried first; as they are sharp to a part in 1000
+    (`proof.SHARPNESS`), so is the factor. It may be too much, as what counts as
+    standing and as slip does not scale with the speed; then a factor is found that is
+    proved and at most 1 % below one that is not.
     """
     promised = min(report.speed_factor * (1 - 1e-9), MAX_FACTOR)
     proved = 1.0 if report.valid else 0.0
@@ -268,7 +283,7 @@ def _proved_factor(
 
     if holds(promised):
         return promised
-    for _ in range(FACTOR_STEPS):
+    while promised > FACTOR_STEP * max(proved, MIN_FACTOR):
         middle = math.sqrt(max(proved, MIN_FACTOR) * promised)
         if holds(middle):
             proved = middle

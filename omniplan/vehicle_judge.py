@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,10 +36,12 @@ from omniplan.chords import (
 )
 from omniplan.motion import Enclosure
 from omniplan.rows import Bounds, Row, Tolerances, WindingWheel
+from omniplan.swing import Swing, swinging
 
 __all__ = ["VehicleJudge", "winds"]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 SEAM = 1e-9
 """So near to a stop of a full turn either stop may be meant, rad."""
@@ -56,11 +59,26 @@ class VehicleJudge:
         *,
         is_own: bool,
         has_rates: bool,
+        has_swing: bool = False,
     ) -> None:
+        """Take what is known of the motions.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+        tolerances : Tolerances
+        is_own : bool
+            Whether they are the vehicle's own Omni-Curve-Parameters.
+        has_rates : bool
+            Whether accelerations are known.
+        has_swing : bool
+            Whether steering accelerations are known: `Enclosure.swing`.
+        """
         self._vehicle = vehicle
         self._tolerances = tolerances
         self._is_own = is_own
         self._has_rates = has_rates
+        self._has_swing = has_swing
         self.kappa_g = vehicle.boundary_curvature
         self.reference = vehicle.reference
         self.wheel_ids = tuple(wheel.id for wheel in vehicle.wheels)
@@ -71,7 +89,10 @@ class VehicleJudge:
         self.rows: tuple[Row, ...] = ()
         # One evaluation on an empty part lists the rows.
         empty = np.zeros(0)
-        nothing = Enclosure(*([empty] * 15))  # type: ignore[arg-type]
+        nothing = replace(
+            Enclosure(*([empty] * 15)),  # type: ignore[arg-type]
+            swing=Swing.nothing(),
+        )
         self.rows = tuple(row for row, _ in self._evaluate(nothing, 1))
         self.winding_wheels = tuple(self._winding_wheels())
 
@@ -81,13 +102,14 @@ class VehicleJudge:
                 continue
             wheel = self._vehicle.wheels[row.wheel]
             assert isinstance(wheel, SteerableWheel)
-            rate = wheel.max_steering_rate_deg
+            swing = wheel.max_steering_acceleration_deg
             yield WindingWheel(
                 row.wheel,
                 column,
                 self._vehicle.contacts[row.wheel],
                 *wheel.steering_range,
-                math.inf if rate is None else math.radians(rate),
+                wheel.standing_steering_rate,
+                math.inf if swing is None else math.radians(swing),
             )
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
@@ -137,7 +159,7 @@ class VehicleJudge:
         own: FloatArray,
         moving: tuple[FloatArray, FloatArray],
     ) -> list[tuple[Row, Bounds]]:
-        """Return steering range, singular point and steering rate."""
+        """Return what a wheel's direction and its rolling beside the axis ask for."""
         lost = chord.near <= 0
         # What is reached counts only at ends where the vehicle moves.
         rolls = [
@@ -151,7 +173,7 @@ class VehicleJudge:
         ]
         row = self._sectors[i]
         if row.kappa_share or row.beta_share:
-            zone = zone_bounds(part, row, self.kappa_g, self.reference, chord)
+            zone = zone_bounds(part, row, self.kappa_g, self.reference, chord, moving)
             entries.append((Row("SINGULAR_ZONE", i, 1.0, "1", "none", True), zone))
         if wheel.steering_range_deg is not None:
             entries.append(_steering_range(i, wheel, chord, own, rolls))
@@ -160,12 +182,33 @@ class VehicleJudge:
             limit = math.radians(wheel.max_steering_rate_deg)
             turn = Row("STEER_RATE", i, limit, "rad/s", "speed", True)
             entries.append((turn, over(rate, limit)))
+        if self._has_swing and wheel.max_steering_acceleration_deg is not None:
+            entries.append(self._swinging(i, wheel, part, (rolls[0], rolls[1])))
         if wheel.max_speed is not None:
             roll = Row("WHEEL_SPEED", i, wheel.max_speed, "m/s", "speed", True)
             is_own = self._is_own
-            for bounds in beside_axis(wheel, part, chord, change, own, rate, is_own):
+            beside = beside_axis(wheel, part, chord, change, own, rate, moving, is_own)
+            for bounds in beside:
                 entries.append((roll, bounds))
         return entries
+
+    def _swinging(
+        self,
+        i: int,
+        wheel: SteerableWheel,
+        part: Enclosure,
+        rolls: tuple[BoolArray, BoolArray],
+    ) -> tuple[Row, Bounds]:
+        """Return the steering acceleration |α̈|.
+
+        Within a standstill α̇ may jump: there the wheels are free.
+        """
+        assert part.swing is not None
+        assert wheel.max_steering_acceleration_deg is not None
+        limit = math.radians(wheel.max_steering_acceleration_deg)
+        swing = part.swing.directions.accelerations(self._vehicle.contacts[i])
+        row = Row("STEER_ACCELERATION", i, limit, "rad/s²", "acceleration", True)
+        return row, over(swinging(*swing, rolls), limit)
 
     def _slip(
         self, i: int, wheel: FixedWheel, chord: Chord, speed: Bounds
@@ -208,7 +251,7 @@ def _steering_range(
     wheel: SteerableWheel,
     chord: Chord,
     own: FloatArray,
-    rolls: list[npt.NDArray[np.bool_]],
+    rolls: list[BoolArray],
 ) -> tuple[Row, Bounds]:
     """Return the angle aside of the middle of the range.
 

@@ -331,4 +331,6 @@ def _only(part: Enclosure, end: str) -> Enclosure:
         name: getattr(part, name[:-1] + end) if name[-1] in "01" else value
         for name, value in vars(part).items()
     }
-    return replace(part, **{**fields, "dt": np.zeros_like(part.dt)})
+    swing = None if part.swing is None else part.swing.only(int(end))
+    still = {"dt": np.zeros_like(part.dt), "swing": swing}
+    return replace(part, **{**fields, **still})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -16,7 +17,8 @@ from omniplan.judge import judge_for
 from omniplan.motion import Intervals, OmniCurveMotion
 from omniplan.proof import ROUNDING, Proof
 from omniplan.rows import Judge, Tolerances
-from omniplan.turn_time import Turning, time_of
+from omniplan.searched_way import searched_legs, surface_of
+from omniplan.turn_time import Turning, rest_to_rest, time_of
 from omniplan.winding import Sweep, joined, sweeps_of, unsettled
 
 __all__ = ["Change", "Changer", "Configuration", "Way"]
@@ -63,25 +65,68 @@ class Changer:
     ) -> None:
         self._judge, self._space, self._tolerances = judge, space, tolerances
 
-    def change(self, start: Configuration, goal: Configuration) -> Change:
+    def change(
+        self, start: Configuration, goal: Configuration, rest: float = math.inf
+    ) -> Change:
         """Return a few ways through the space.
 
         The straight way in both directions of β, the way through pure translation and
-        the ways through the poles; a longer way that none of them finds is not looked
-        for, so an answer "no way" may be too strict but never too lenient.
+        the ways through the poles. Where none of them is inside the space or quick
+        enough, a way is searched for (`omniplan.transitions`). Each is proved by the
+        judge, so an answer "no way" may be too strict but never too lenient.
 
         Parameters
         ----------
         start, goal : (float, float), 1 and rad
+        rest : float, s
+            Time there is.
         """
         wheel, turn = self._turn(start, goal)
         if abs(turn) <= self._tolerances.alignment:
             stay = Way(0.0, tuple(self._aligned(start, goal)))
             return Change(start, goal, wheel, turn, (stay,))
         ways = [self._way(legs) for legs in _ways(start, goal)]
+        quickest = min(way.time for way in ways)
+        if quickest > rest or math.isinf(quickest):
+            ways += self._searched(start, goal, quickest, rest)
         if not self._judge.winding_wheels:
             ways = [min(ways, key=lambda way: way.time)]
         return Change(start, goal, wheel, turn, tuple(ways))
+
+    def _searched(
+        self, start: Configuration, goal: Configuration, known: float, rest: float
+    ) -> list[Way]:
+        """Return the way by search, if there is one and it may be of use.
+
+        Where a way is known and the wheels cannot possibly turn in the time there is,
+        none is.
+        """
+        if math.isfinite(known) and self._least_time(start, goal) > rest:
+            return []
+        surface = surface_of(self._space)
+        if surface is None:
+            return []
+        for leg in searched_legs(surface, start, goal):
+            way = self._leg(leg)
+            if math.isfinite(way.time):
+                return [way]
+        return []
+
+    def _least_time(self, start: Configuration, goal: Configuration) -> float:
+        """Return the time that the wheels need at least, s: each by itself."""
+        vehicle, times = self._space.vehicle, [0.0]
+        for i, wheel in enumerate(() if vehicle is None else vehicle.wheels):
+            if isinstance(wheel, SteerableWheel):
+                assert vehicle is not None
+                z0, z1 = (
+                    complex(wheel_directions(vehicle, *c)[i]) for c in (start, goal)
+                )
+                turn = np.array(abs(cmath.phase(z1 * z0.conjugate())))
+                swing = wheel.max_steering_acceleration_deg
+                limit = math.inf if swing is None else math.radians(swing)
+                rate = wheel.standing_steering_rate
+                times.append(float(rest_to_rest(turn, rate, limit)))
+        return max(times)
 
     def _aligned(self, start: Configuration, goal: Configuration) -> list[Sweep]:
         """Return how the winding wheels turn between what counts as the same."""

@@ -3,7 +3,7 @@
 A dynamic programme over the full turns k that a wheel's followed angle differs by from
 its direction. Given what is driven and which way is taken at every standstill, wheels
 do not depend on each other. At a standstill a wheel may also unwind: it turns by full
-turns on its own, at its largest rate and before or after the way.
+turns on its own, from rest to rest and before or after the way.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omniplan.rows import WindingWheel
+from omniplan.turn_time import rest_to_rest
 from omniplan.ways import Way
 from omniplan.winding import Sweep
 
@@ -105,12 +106,14 @@ class Track:
         shift = round((end + turned.turn - after.start) / TURN)
         total = fresh.k[None, :] - self.k[:, None] - shift
         ends: FloatArray = end + TURN * self.k.astype(np.float64)
-        turns = self._full_turns(ends, turned, total)
-        rate = self.wheel.rate
+        turns, moves = self._full_turns(ends, turned, total)
         # Infinitely fast wheels take no time, but cannot pass a stop either.
         fits = np.isfinite(turns)
         turns = np.where(fits, turns, 0.0)
-        time = np.where(fits, turns * (TURN / rate), np.inf)
+        each = rest_to_rest(
+            turns * (TURN / moves), self.wheel.rate, self.wheel.acceleration
+        )
+        time = np.where(fits, moves * each, np.inf)
         # Beside a way that takes too long already, unwinding is no mistake of its own.
         spare = rest - way.time if way.time <= rest else np.inf
         price = np.where((time > spare) | np.isinf(time), SHORT_REST, 0.0)
@@ -121,11 +124,14 @@ class Track:
         step = _Step(parent, total[pick], time[pick])
         return replace(fresh, cost=fresh.cost + sums[pick], before=(self,), step=step)
 
-    def _full_turns(self, angle: FloatArray, way: Sweep, total: IntArray) -> FloatArray:
-        """Return how many full turns a wheel makes, (n, n'); infinite if none fit.
+    def _full_turns(
+        self, angle: FloatArray, way: Sweep, total: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Return how many full turns a wheel makes, (n, n'), and in how many moves.
 
         Those before the way must bring it to where the way stays in range; the sum is
-        given.
+        given. Turns are infinite if none fit. Two moves, before and after the way, take
+        longest if they are alike, which is what is reckoned with.
         """
         least = np.ceil((self.wheel.least - angle - way.low - SLACK) / TURN)
         most = np.floor((self.wheel.largest - angle - way.high + SLACK) / TURN)
@@ -133,7 +139,12 @@ class Track:
             least[:, None] - np.maximum(total, 0), np.minimum(total, 0) - most[:, None]
         )
         turns = np.abs(total) + 2 * np.maximum(detour, 0.0)
-        return np.where((least <= most)[:, None], turns, np.inf)
+        before, after = (
+            (least[:, None] <= k) & (k <= most[:, None])
+            for k in (total, np.zeros_like(total))
+        )
+        moves = np.where(before | after, 1, 2)
+        return np.where((least <= most)[:, None], turns, np.inf), moves
 
     def line(self) -> list[Track]:
         """Return the tracks of all pieces, from the first to this one."""

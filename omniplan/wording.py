@@ -24,6 +24,7 @@ _WHAT = {
     "LATERAL_ACCELERATION": "lateral acceleration",
     "FIXED_WHEEL": "sideways slip of a wheel that does not steer",
     "STEER_RATE": "steering rate",
+    "STEER_ACCELERATION": "steering acceleration",
     "WHEEL_ACCELERATION": "change of the rolling speed",
     "ACCELERATION": "acceleration",
     "DECELERATION": "deceleration",
@@ -94,6 +95,8 @@ def quantity(value: float, unit: str) -> str:
         return f"{math.degrees(value):.1f}°"
     if unit == "rad/s":
         return f"{math.degrees(value):.1f}°/s"
+    if unit == "rad/s²":
+        return f"{math.degrees(value):.0f}°/s²"
     if unit == "1":
         return f"{value:.3f}"
     return f"{value:.3f} {unit}"
@@ -156,6 +159,8 @@ def ranking_lines(ranking: Ranking) -> Iterator[str]:
         yield f"  no {report.vehicle}: {refusal(report)}"
         for advice in report.advice:
             yield f"     advice: {advice.text}"
+    for undrivable in ranking.undrivable:
+        yield f"  no {undrivable.vehicle}: {undrivable}"
     for unfit in ranking.unfit:
         for short in unfit.shortfalls:
             yield f"  unfit {unfit.vehicle}: {short}"

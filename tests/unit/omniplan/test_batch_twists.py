@@ -1,5 +1,6 @@
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,12 +54,10 @@ def by_contains(
             permitted |= forwards & space.contains(kappa_n, line, v_s)
         else:
             permitted |= space.contains(kappa_n, beta, v_s)
-    return fits & permitted
+    return np.asarray(fits & permitted)
 
 
-def assert_alike(
-    twists: npt.NDArray[np.floating[npt.NBitBase]], space: PermissibleSpace
-) -> BoolArray:
+def assert_alike(twists: npt.NDArray[Any], space: PermissibleSpace) -> BoolArray:
     """Assert the same answers, at the last digit of a threshold aside."""
     expected = by_contains(twists, space)
     exact = twists.astype(np.float64)
@@ -95,7 +94,7 @@ def random_twists(
 
 @pytest.mark.parametrize("kind", ALL_KINDS)
 def test_agrees_with_contains_for_random_vehicles(kind: str) -> None:
-    rng = np.random.default_rng(abs(hash_of(kind)))
+    rng = np.random.default_rng(seed_of(kind))
     for _ in range(3):
         known = build_space(random_vehicle(rng, kind), GRID, cache=False)  # type: ignore[arg-type]
         twists = random_twists(rng, known, 4000)
@@ -106,8 +105,8 @@ def test_agrees_with_contains_for_random_vehicles(kind: str) -> None:
         assert not expected.all()
 
 
-def hash_of(text: str) -> int:
-    return sum(ord(letter) * 31**i for i, letter in enumerate(text)) % 2**31
+def seed_of(kind: str) -> int:
+    return 100 + list(ALL_KINDS).index(kind)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -147,7 +146,7 @@ def test_standing_still_is_permitted_even_where_straight_ahead_is_blocked() -> N
         }
     )
     space = build_space(vehicle, GRID, cache=False)
-    twists = [[0, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [0, -0.5, 0]]
+    twists = [[0.0, 0.0, 0.0], [0.5, 0, 0], [0, 0.5, 0], [0, -0.5, 0]]
     np.testing.assert_array_equal(
         check_twists(twists, space), [True, False, True, True]
     )
@@ -172,7 +171,7 @@ def test_backwards_has_its_own_limit() -> None:
         }
     )
     space = build_space(vehicle, GRID, cache=False)
-    twists = [[0.9, 0, 0], [-0.9, 0, 0], [-0.29, 0, 0]]
+    twists: list[list[float]] = [[0.9, 0, 0], [-0.9, 0, 0], [-0.29, 0, 0]]
     assert check_twists(twists, space).tolist() == [True, False, True]
 
 
@@ -199,7 +198,11 @@ def test_slip_of_a_line_mobile_vehicle_is_within_the_tolerances(
 def test_a_synchro_drive_may_turn_within_the_tolerances() -> None:
     space = build_space(configspace.load_vehicle("synchro-drive"), GRID, cache=False)
     slow = 0.004 * space.kappa_g
-    twists = [[0.1, 0.1, slow], [0.1, 0.1, 2 * slow], [0.0, 0.0, slow]]
+    twists: list[list[float]] = [
+        [0.1, 0.1, slow],
+        [0.1, 0.1, 2 * slow],
+        [0.0, 0.0, slow],
+    ]
     assert check_twists(twists, space).tolist() == [True, False, True]
 
 
