@@ -27,12 +27,28 @@ def platform(n_wheels: int) -> configspace.Vehicle:
     )
 
 
-@pytest.mark.parametrize("n_wheels", [4, 40, 280])
+@pytest.mark.parametrize("n_wheels", [4, 16, 40, 100, 200, 300, 400])
 def test_build_a_sound_space(benchmark: BenchmarkFixture, n_wheels: int) -> None:
-    """400 × 720 cells, warm."""
-    vehicle = platform(n_wheels)
-    configspace.build_space(vehicle, cache=False)
-    benchmark(configspace.build_space, vehicle, cache=False)
+    """400 × 720 cells, warm, over the number of wheels."""
+    build(benchmark, platform(n_wheels), configspace.Grid())
+
+
+@pytest.mark.parametrize(
+    ("n_kappa", "n_beta"), [(100, 180), (200, 360), (400, 720), (800, 1440)]
+)
+def test_build_over_the_grid(
+    benchmark: BenchmarkFixture, n_kappa: int, n_beta: int
+) -> None:
+    """Four wheels, warm, over the number of cells."""
+    build(benchmark, platform(4), configspace.Grid(n_kappa, n_beta))
+
+
+def build(
+    benchmark: BenchmarkFixture, vehicle: configspace.Vehicle, grid: configspace.Grid
+) -> None:
+    """Measure several warm builds; the least of them is what the machine can do."""
+    configspace.build_space(vehicle, grid, cache=False)
+    benchmark(configspace.build_space, vehicle, grid, cache=False)
 
 
 def test_read_a_space_from_the_cache(
@@ -46,7 +62,7 @@ def test_read_a_space_from_the_cache(
 
 
 def test_look_up_a_million_configurations(benchmark: BenchmarkFixture) -> None:
-    """NumPy path of `contains`; the batch kernel is still to come."""
+    """NumPy path of `contains`."""
     space = configspace.build_space(
         configspace.load_vehicle("ift-four-steered"), cache=False
     )

@@ -8,10 +8,20 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from omniplan.errors import InvalidTrajectory
+    from omniplan.batch import check_twists, validate_many
+    from omniplan.errors import InvalidTrajectory, NotDrivable
+    from omniplan.faults import Fault, Undrivable
+    from omniplan.fitness import FleetVehicle, Suitability, suitable
     from omniplan.fleet import select
+    from omniplan.path import Path
+    from omniplan.plot import plot_report
     from omniplan.report import Advice, Candidate, Ranking, Report, Violation
+    from omniplan.requirements import parse_requirement
     from omniplan.rows import Tolerances
+    from omniplan.shortfalls import Shortfall, Unfit
+    from omniplan.timing import fastest, time_path, time_paths
+    from omniplan.timing_result import SpeedProfile, Timing, TimingStatus
+    from omniplan.trace import Trace, margins
     from omniplan.trajectory import Trajectory
     from omniplan.trajectory_io import read_trajectories, write_trajectories
     from omniplan.validation import validate
@@ -19,25 +29,67 @@ if TYPE_CHECKING:
 __all__ = [
     "Advice",
     "Candidate",
+    "Fault",
+    "FleetVehicle",
     "InvalidTrajectory",
+    "NotDrivable",
+    "Path",
     "Ranking",
     "Report",
+    "Shortfall",
+    "SpeedProfile",
+    "Suitability",
+    "Timing",
+    "TimingStatus",
     "Tolerances",
+    "Trace",
     "Trajectory",
+    "Undrivable",
+    "Unfit",
     "Violation",
+    "check_twists",
+    "fastest",
+    "margins",
+    "parse_requirement",
+    "plot_report",
     "read_trajectories",
     "select",
+    "suitable",
+    "time_path",
+    "time_paths",
     "validate",
+    "validate_many",
     "write_trajectories",
 ]
 
 _HOMES = {
+    "Fault": "faults",
+    "FleetVehicle": "fitness",
     "InvalidTrajectory": "errors",
+    "NotDrivable": "errors",
+    "Path": "path",
+    "Shortfall": "shortfalls",
+    "SpeedProfile": "timing_result",
+    "Suitability": "fitness",
+    "Timing": "timing_result",
+    "TimingStatus": "timing_result",
     "Tolerances": "rows",
+    "Trace": "trace",
     "Trajectory": "trajectory",
+    "Undrivable": "faults",
+    "Unfit": "shortfalls",
+    "check_twists": "batch_twists",
+    "fastest": "timing",
+    "margins": "trace",
+    "parse_requirement": "requirements",
+    "plot_report": "plot",
     "read_trajectories": "trajectory_io",
     "select": "fleet",
+    "suitable": "fitness",
+    "time_path": "timing",
+    "time_paths": "timing",
     "validate": "validation",
+    "validate_many": "batch",
     "write_trajectories": "trajectory_io",
 }
 

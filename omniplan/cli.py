@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import json
 import sys
 from collections.abc import Sequence
@@ -18,9 +19,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
+    import omniplan.path
     from configspace import PermissibleSpace
+    from omniplan.fitness import Suitability
     from omniplan.report import Ranking, Report
+    from omniplan.timing_result import Timing
     from omniplan.trajectory import Trajectory
+    from services import Server
 
 __all__ = ["main"]
 
@@ -90,33 +95,39 @@ def _parser() -> argparse.ArgumentParser:
 
     check = command("check", _check, "judge trajectories for one vehicle")
     _trajectory_arguments(check)
+    who = check.add_mutually_exclusive_group(required=True)
+    who.add_argument("--vehicle", help="catalogue name, vehicle file or data sheet")
+    who.add_argument(
+        "--fleet", nargs="+", metavar="VEHICLE", help="several; needs --out"
+    )
     check.add_argument(
-        "--vehicle", required=True, help="catalogue name, vehicle file or data sheet"
+        "--out", type=Path, metavar="FILE.parquet", help="for a fleet: the verdicts"
     )
     check.add_argument("--plot", type=Path, metavar="DIR", help="draw the trajectories")
 
     select = command("select", _select, "rank the vehicles of a fleet")
-    _trajectory_arguments(select)
+    _trajectory_arguments(select, "*")
     select.add_argument(
-        "--fleet", nargs="+", metavar="VEHICLE", help="default: the whole catalogue"
+        "--fleet",
+        nargs="+",
+        metavar="[NAME=]VEHICLE",
+        help="default: the whole catalogue; names tell vehicles of one type apart",
     )
-    select.add_argument("--by", default="duration", help="duration (default) or margin")
+    _ranking_arguments(select)
 
     serve = command("serve", _serve, "answer questions about a fleet over zenoh")
-    serve.add_argument(
-        "--fleet", nargs="+", metavar="VEHICLE", help="default: the whole catalogue"
-    )
-    serve.add_argument("--site", default="default")
-    serve.add_argument("--listen", default=DEFAULT_ENDPOINT, help="%(default)s")
+    _serve_arguments(serve)
 
     query = command("query", _query, "ask a server")
     query.add_argument(
         "what", choices=["health", "vehicles", "check", "select", "sheet"]
     )
-    query.add_argument("trajectories", nargs="*", type=Path, help="CSV files")
+    query.add_argument(
+        "trajectories", nargs="*", type=Path, help="CSV or Parquet files"
+    )
     query.add_argument("--vehicle", help="for check and sheet")
     query.add_argument("--fleet", nargs="+", metavar="VEHICLE", help="for select")
-    query.add_argument("--by", default="duration", help="for select")
+    _ranking_arguments(query)
     query.add_argument("--output", type=Path, help="for sheet: the file to write")
     query.add_argument("--site", default="default")
     query.add_argument("--connect", default=DEFAULT_ENDPOINT, help="%(default)s")
@@ -129,18 +140,75 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     schema = command("schema", _schema, "print a JSON Schema")
-    schema.add_argument("what", choices=["vehicle"])
+    schema.add_argument("what", choices=["service", "vehicle"])
+
+    bench = command("bench", _bench, "measure batches on this machine")
+    bench.add_argument(
+        "--quick", action="store_true", help="a hundredth of the work, less exact"
+    )
 
     command("catalog", _catalog, "list the ready vehicles")
     return parser
 
 
-def _trajectory_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("trajectories", nargs="+", type=Path, help="CSV files")
+def _trajectory_arguments(parser: argparse.ArgumentParser, number: str = "+") -> None:
+    parser.add_argument(
+        "trajectories",
+        nargs=number,
+        type=Path,
+        help="CSV, Parquet or VDA 5050 files: .csv, .parquet, .json",
+    )
     parser.add_argument(
         "--parameters-of",
         metavar="VEHICLE",
         help="the vehicle whose kappa_n, beta, v_n the files hold",
+    )
+    parser.add_argument(
+        "--allow-unreachable",
+        action="store_true",
+        help="permit motions that no way inside the space leads to from straight ahead",
+    )
+
+
+def _serve_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what overrides the configuration; each dest is a place within that."""
+    parser.add_argument("--config", metavar="FILE", help="TOML; see docs/operation.md")
+    parser.add_argument(
+        "--fleet",
+        nargs="+",
+        metavar="VEHICLE",
+        help="catalogue names, files or folders of them; default: the whole catalogue",
+    )
+    parser.add_argument("--site", help="default: default")
+    parser.add_argument("--listen", help=f"default: {DEFAULT_ENDPOINT}")
+    parser.add_argument("--workers", type=int, help="threads; default: 2")
+    parser.add_argument(
+        "--allow-insecure",
+        action="store_true",
+        default=None,
+        help="listen beyond this machine without certificates",
+    )
+    parser.add_argument(
+        "--log-level", dest="log.level", help="debug, info (default), warning, error"
+    )
+    parser.add_argument("--log-format", dest="log.format", help="text (default), json")
+
+
+def _ranking_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--by",
+        default="duration",
+        help="for select: duration (default), margin or manoeuvrability",
+    )
+    parser.add_argument(
+        "--require",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="for select: a requirement, in quotes; may be repeated. One of: "
+        "turn on the spot [at W deg/s]; crab A deg [at V m/s]; radius R m [at V m/s] "
+        "[forwards|backwards|both ways]; speed V m/s [forwards|backwards|both ways]; "
+        "payload M kg; footprint L m x W m; no mirroring; passable backwards",
     )
 
 
@@ -191,55 +259,148 @@ def _inspect(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
+    from configspace import InvalidInput, Problem
     from omniplan.validation import validate
 
+    if (options.fleet is None) != (options.out is None):
+        raise InvalidInput(
+            Problem("check", "one of --fleet and --out", "both or none of them")
+        )
+    if options.fleet is not None:
+        return _check_fleet(options)
     space = _space(options.vehicle)
-    trajectories = _trajectories(options.trajectories, options.parameters_of)
-    reports = [validate(trajectory, space) for trajectory in trajectories]
+    motions = _motions(options.trajectories, options.parameters_of)
+    timings = [_timing(motion, space, options.allow_unreachable) for motion in motions]
+    trajectories = [
+        found
+        for motion, timing in zip(motions, timings, strict=True)
+        if (found := _with_times(motion, timing)) is not None
+    ]
+    reports = [
+        validate(trajectory, space, allow_unreachable=options.allow_unreachable)
+        for trajectory in trajectories
+    ]
     if options.plot is not None:
-        from configspace.plot import save_figure
-        from omniplan.plot import plot_trajectory
+        from omniplan.plot import plot_report
 
-        options.plot.mkdir(parents=True, exist_ok=True)
-        for trajectory in trajectories:
-            path = options.plot / f"{trajectory.name}.png"
-            footprint = space.header.footprint or None
-            save_figure(plot_trajectory(trajectory, footprint=footprint), path)
-            _say(f"wrote {path}", options.json)
-    return _answer_reports(reports, options.json)
+        for report, trajectory in zip(reports, trajectories, strict=True):
+            for path in plot_report(
+                report,
+                trajectory,
+                space,
+                options.plot,
+                allow_unreachable=options.allow_unreachable,
+            ):
+                _say(f"wrote {path}", options.json)
+    return _answer_timed(timings, reports, options.json)
+
+
+def _check_fleet(options: argparse.Namespace) -> int:
+    from omniplan.batch import Batch
+    from omniplan.batch_files import write_verdicts
+    from omniplan.batch_paths import PathBatch
+    from omniplan.trajectory import Trajectory
+
+    motions = _motions(options.trajectories, options.parameters_of)
+    trajectories = [one for one in motions if isinstance(one, Trajectory)]
+    fleet = _fleet(options.fleet, _progress_console())
+    allow = options.allow_unreachable
+    batch: Batch | PathBatch
+    if len(trajectories) == len(motions):
+        batch = Batch(trajectories, fleet, allow_unreachable=allow)
+    else:
+        batch = PathBatch(motions, fleet, allow_unreachable=allow)
+    written = write_verdicts(options.out, batch, progress=True)
+    if options.json:
+        _print_json({"output": str(options.out), **dataclasses.asdict(written)})
+    else:
+        print(
+            f"{written.valid} of {written.pairs} pairs are valid; wrote {options.out}"
+        )
+    return YES if written.valid == written.pairs else NO
 
 
 def _select(options: argparse.Namespace) -> int:
-    from omniplan.fleet import select
+    from rich.progress import track
 
-    trajectories = _trajectories(options.trajectories, options.parameters_of)
-    fleet = _fleet(options.fleet, _progress_console())
-    return _answer_rankings(select(trajectories, fleet, options.by), options.json)
+    from configspace import InvalidInput, Problem
+    from omniplan.fitness import requirements_of, suitable
+    from omniplan.fleet import ranked_by
+
+    asked = requirements_of(options.require)
+    if not options.trajectories and not asked:
+        given = "no trajectory and no --require"
+        raise InvalidInput(Problem("select", given, "at least one is needed"))
+    motions = _motions(options.trajectories, options.parameters_of)
+    console = _progress_console()
+    fleet = _named_fleet(options.fleet, console)
+    if not options.trajectories:
+        answer = suitable(fleet, asked, allow_unreachable=options.allow_unreachable)
+        return _answer_suitability(answer, options.json)
+    ranked = ranked_by(
+        fleet,
+        options.by,
+        requirements=asked,
+        allow_unreachable=options.allow_unreachable,
+    )
+    progress = track(motions, "Judging", console=console, transient=True)
+    return _answer_rankings([ranked(one) for one in progress], options.json)
 
 
 def _serve(options: argparse.Namespace) -> int:
+    import os
     import signal
 
-    from services import Server
+    from services import logs
+    from services.config import load_config, variables
+    from services.launch import registry_of, server_of, warm_up
 
-    fleet = _fleet(options.fleet, _progress_console())
+    file = options.config or os.environ.get("OMNIPLAN_CONFIG")
+    flags = {p: getattr(options, p, None) for p in variables().values()}
+    config = load_config(file, os.environ, flags)
+    logs.configure(config.log.level, config.log.format)
     # As if Ctrl-C were pressed: close() belongs to the main thread, not to a handler.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with (
-        contextlib.suppress(KeyboardInterrupt),
-        Server(fleet, site=options.site, listen=options.listen) as server,
-    ):
-        names = [space.name for space in fleet]
-        if options.json:
-            _print_json({"endpoint": server.endpoint, "vehicles": names})
-        else:
-            print(
-                f"serving {len(names)} vehicles at {server.endpoint}, "
-                f"site {server.site}; Ctrl-C stops",
-                flush=True,
-            )
-        server.wait()
-    return YES
+    fleet = _fleet_of_entries(config.fleet, _progress_console())
+    with _progress_console().status("Getting ready"):
+        warm_up(fleet)
+    with registry_of(config, fleet) as registry:
+        server = server_of(config, registry)
+        server.start()
+        try:
+            _say_serving(server, options.json)
+            with contextlib.suppress(KeyboardInterrupt):
+                server.wait()
+        finally:
+            # A second Ctrl-C ends this, too, and the process with FAILURE.
+            is_clean = server.close()
+    return YES if is_clean else FAILURE
+
+
+def _say_serving(server: Server, as_json: bool) -> None:
+    vehicles = server.vehicles
+    if as_json:
+        _print_json({"endpoint": server.endpoint, "vehicles": vehicles})
+    else:
+        print(
+            f"serving {len(vehicles)} vehicles at {server.endpoint}, "
+            f"site {server.site}; Ctrl-C stops",
+            flush=True,
+        )
+
+
+def _fleet_of_entries(
+    entries: Sequence[str] | None, console: Console
+) -> list[PermissibleSpace]:
+    """Return the vehicles of a configuration; a folder stands for all within it."""
+    from services.folder import fleet_of_folder
+
+    folders = [entry for entry in entries or () if Path(entry).is_dir()]
+    if not folders:
+        return _fleet(entries, console)
+    names = [entry for entry in entries or () if entry not in folders]
+    spaces = _fleet(names, console) if names else []
+    return [*spaces, *(s for folder in folders for s in fleet_of_folder(folder))]
 
 
 def _query(options: argparse.Namespace) -> int:
@@ -266,7 +427,9 @@ def _query(options: argparse.Namespace) -> int:
             return _answer_reports(reports, options.json)
         else:
             trajectories = _trajectories(options.trajectories, None)
-            rankings = client.select(trajectories, options.fleet, options.by)
+            rankings = client.select(
+                trajectories, options.fleet, options.by, requirements=options.require
+            )
             return _answer_rankings(rankings, options.json)
     return YES
 
@@ -285,8 +448,24 @@ def _export(options: argparse.Namespace) -> int:
 
 def _schema(options: argparse.Namespace) -> int:
     from configspace import vehicle_schema
+    from services.config import service_schema
 
-    _print_json({"vehicle": vehicle_schema}[options.what]())
+    schemas = {"service": service_schema, "vehicle": vehicle_schema}
+    _print_json(schemas[options.what]())
+    return YES
+
+
+def _bench(options: argparse.Namespace) -> int:
+    from omniplan.bench import Size, bench, bench_table
+
+    small = Size(200_000, 2_000, 100, 100)
+    console = _progress_console()
+    with console.status("Measuring; takes a minute or two"):
+        found = bench(small if options.quick else Size())
+    if options.json:
+        _print_json(found)
+    else:
+        _console().print(bench_table(found))
     return YES
 
 
@@ -318,12 +497,83 @@ def _fleet(names: Sequence[str] | None, console: Console) -> list[PermissibleSpa
     ]
 
 
+def _named_fleet(
+    given: Sequence[str] | None, console: Console
+) -> list[tuple[str, PermissibleSpace]]:
+    """Return the fleet of ``[NAME=]VEHICLE`` texts, each vehicle loaded once."""
+    from configspace import catalog
+
+    pairs = [
+        ("", text) if Path(text).exists() else text.rpartition("=")[::2]
+        for text in given or catalog()
+    ]
+    files = list(dict.fromkeys(vehicle for _, vehicle in pairs))
+    spaces = dict(zip(files, _fleet(files, console), strict=True))
+    return [(name or spaces[file].name, spaces[file]) for name, file in pairs]
+
+
 def _trajectories(paths: Sequence[Path], parameters_of: str | None) -> list[Trajectory]:
+    from omniplan.trajectory import timed
+
+    return [timed(motion) for motion in _motions(paths, parameters_of)]
+
+
+def _motions(
+    paths: Sequence[Path], parameters_of: str | None
+) -> list[Trajectory | omniplan.path.Path]:
     from configspace import load_vehicle
     from omniplan.trajectory_io import read_trajectories
 
     vehicle = load_vehicle(parameters_of) if parameters_of else None
-    return [found for path in paths for found in read_trajectories(path, vehicle)]
+    return [motion for path in paths for motion in read_trajectories(path, vehicle)]
+
+
+def _timing(
+    motion: Trajectory | omniplan.path.Path,
+    space: PermissibleSpace,
+    allow_unreachable: bool,
+) -> Timing | None:
+    """Return the fastest timing of a path, None for what has times."""
+    from omniplan.trajectory import Trajectory
+
+    if isinstance(motion, Trajectory):
+        return None
+    from omniplan.timing import time_path
+
+    return time_path(motion, space, allow_unreachable=allow_unreachable)
+
+
+def _with_times(
+    motion: Trajectory | omniplan.path.Path, timing: Timing | None
+) -> Trajectory | None:
+    from omniplan.trajectory import Trajectory
+
+    if isinstance(motion, Trajectory):
+        return motion
+    return None if timing is None else timing.trajectory
+
+
+def _answer_timed(
+    timings: Sequence[Timing | None], reports: Sequence[Report], as_json: bool
+) -> int:
+    """Answer with a report for all that has times; paths also with their timing."""
+    from omniplan.wording import report_lines
+
+    judged, found = iter(reports), []
+    for timing in timings:
+        report = None
+        if timing is None or timing.trajectory is not None:
+            report = next(judged)
+        if not as_json:
+            if timing is not None:
+                print(f"timed: {timing.message}")
+            if report is not None:
+                print("\n".join(report_lines(report)))
+        data = {"valid": False} if report is None else report.to_dict()
+        found.append(data if timing is None else {**data, "timing": timing.to_dict()})
+    if as_json:
+        _print_json(found)
+    return YES if all(one["valid"] for one in found) else NO
 
 
 def _answer_reports(reports: Sequence[Report], as_json: bool) -> int:
@@ -338,14 +588,25 @@ def _answer_reports(reports: Sequence[Report], as_json: bool) -> int:
 
 
 def _answer_rankings(rankings: Sequence[Ranking], as_json: bool) -> int:
-    from omniplan.wording import ranking_lines
+    from omniplan.tables import show_ranking
 
     if as_json:
         _print_json([ranking.to_dict() for ranking in rankings])
     else:
+        console = _console()
         for ranking in rankings:
-            print("\n".join(ranking_lines(ranking)))
+            show_ranking(ranking, console)
     return YES if all(ranking.best for ranking in rankings) else NO
+
+
+def _answer_suitability(answer: Suitability, as_json: bool) -> int:
+    from omniplan.tables import show_suitability
+
+    if as_json:
+        _print_json(answer.to_dict())
+    else:
+        show_suitability(answer, _console())
+    return YES if answer.suitable else NO
 
 
 def _console() -> Console:
