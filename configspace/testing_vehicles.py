@@ -82,7 +82,17 @@ def random_vehicle(
         _add_load(rng, data)
     if kind == "guaranteed" or (kind == "loaded" and rng.random() < 0.3):
         _add_guarantee(rng, data)
+    _add_steering_accelerations(rng.spawn(1)[0], data)
     return vehicle_from_data(data)
+
+
+def _add_steering_accelerations(rng: np.random.Generator, data: dict[str, Any]) -> None:
+    """Limit how fast some vehicles may change their steering rates."""
+    share = 0.7 if rng.random() < 0.25 else 0.0
+    for wheel in data["wheels"]:
+        if wheel["type"] in {"steered", "turntable"} and rng.random() < share:
+            swing = float(10.0 ** rng.uniform(1.5, 3.5))
+            wheel["max_steering_acceleration_deg"] = swing
 
 
 def _add_load(rng: np.random.Generator, data: dict[str, Any]) -> None:

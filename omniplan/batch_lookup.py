@@ -2,7 +2,8 @@
 
 A first pass without branches puts every twist on the cube of `batch_surface` and
 compares with two thresholds; it is cut into loops that the compiler turns into vector
-code. What lies between the thresholds is settled in float64 by a second pass.
+code. What lies between the thresholds is decided in float64: most of it by the table
+of the space, read quickly, the rest exactly.
 """
 # mypy: disallow-untyped-decorators = False
 
@@ -14,14 +15,16 @@ import numpy as np
 from numba import njit, prange
 
 from configspace.threads import RELEASES_LOCK
+from omniplan.batch_narrow import narrow
 from omniplan.batch_settle import settle
+from omniplan.prefetch import prefetch
 
 __all__ = ["check", "check_parallel"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 F, I32, U, B = np.float32, np.int32, np.uint32, np.uint8
 
-PART = 4096
+PART = 2048
 """Twists that go through the loops together: their scratch arrays stay in L1."""
 CHUNK = 16 * PART
 """Twists per task of a thread."""
@@ -31,31 +34,27 @@ ZERO, ONE = F(0), F(1)
 NEVER, FAR = F(-1), F(np.inf)
 """Instead of a threshold: settle it; refuse it."""
 OPEN = 2
-WIDE = 32
-"""So many answers are looked through together for open ones."""
-
-
-@njit(cache=True, error_model="numpy")
-def _on_cube(
-    twists: Array, x: Array, y: Array, z: Array, to_x: float, to_y: float, to_z: float
-) -> None:
-    """Velocity of K and ω / κ_g of flat twists of the file's origin."""
-    for k in range(x.size):
-        omega = F(twists[3 * k + 2])
-        x[k] = F(twists[3 * k]) + omega * to_x
-        y[k] = F(twists[3 * k + 1]) + omega * to_y
-        z[k] = omega * to_z
+STRIDE = 16
+"""Twists whose successors are asked for together ..."""
+LINE = 64
+"""... by lines of the cache, bytes."""
+ANY_OPEN = np.uint64(0x0202020202020202)
+"""`OPEN` in each of eight codes."""
 
 
 @njit(cache=True, error_model="numpy")
 def _cells_of_cube(
-    xs: Array, ys: Array, zs: Array, cell: Array, q: Array,
+    twists: Array, cell: Array, q: Array, to_x: float, to_y: float, to_z: float,
     scale: float, half: float, side: int, signed: int,
 ) -> None:  # fmt: skip
-    """Cell and threshold of every twist; -1 for what is not compared in float32."""
-    top = F(side - 1)
-    for k in range(xs.size):
-        x, y, z = xs[k], ys[k], zs[k]
+    """Cell and threshold of flat twists; -1 for what is not compared in float32."""
+    top, face = F(side - I32(1)), side * side
+    faces_z, faces_behind = I32(2) * face, signed * face
+    for k in range(cell.size):
+        omega = F(twists[3 * k + 2])
+        x = F(twists[3 * k]) + omega * to_x
+        y = F(twists[3 * k + 1]) + omega * to_y
+        z = omega * to_z
         ax, ay, az = abs(x), abs(y), abs(z)
         on_x = ax > ay
         xy_size = ax if on_x else ay
@@ -75,37 +74,31 @@ def _cells_of_cube(
         u = u if u < top else top
         v = v if v > ZERO else ZERO
         v = v if v < top else top
-        face = I32(0) if on_x else I32(1)
-        face = I32(2) if on_z else face
-        behind = signed if lead < ZERO else I32(0)
-        cell[k] = ((face + behind) * side + I32(u)) * side + I32(v)
+        before = I32(0) if on_x else face
+        before = faces_z if on_z else before
+        behind = faces_behind if lead < ZERO else I32(0)
+        cell[k] = before + behind + I32(u) * side + I32(v)
         q[k] = m * scale if fine else NEVER
 
 
 @njit(cache=True, error_model="numpy")
-def _on_square(
-    twists: Array, a: Array, b: Array, aside: Array, to_plane: Array
-) -> None:
-    """Three linear forms of flat twists: the two that move the vehicle and the slip."""
+def _cells_of_square(
+    twists: Array, cell: Array, q: Array, to_plane: Array,
+    scale: float, half: float, side: int, sine2: float, slip: float, guard: float,
+) -> None:  # fmt: skip
+    """Like `_cells_of_cube`; -1 also where slip is not surely within its tolerance.
+
+    `to_plane` are three linear forms: the two that move the vehicle and the slip.
+    """
     a0, a1, a2 = to_plane[0, 0], to_plane[0, 1], to_plane[0, 2]
     b0, b1, b2 = to_plane[1, 0], to_plane[1, 1], to_plane[1, 2]
     c0, c1, c2 = to_plane[2, 0], to_plane[2, 1], to_plane[2, 2]
-    for k in range(a.size):
+    top = F(side - I32(1))
+    for k in range(cell.size):
         vx, vy, omega = F(twists[3 * k]), F(twists[3 * k + 1]), F(twists[3 * k + 2])
-        a[k] = vx * a0 + vy * a1 + omega * a2
-        b[k] = vx * b0 + vy * b1 + omega * b2
-        aside[k] = vx * c0 + vy * c1 + omega * c2
-
-
-@njit(cache=True, error_model="numpy")
-def _cells_of_square(
-    xs: Array, ys: Array, slips: Array, cell: Array, q: Array,
-    scale: float, half: float, side: int, sine2: float, slip: float, guard: float,
-) -> None:  # fmt: skip
-    """Like `_cells_of_cube`; -1 also where slip is not surely within its tolerance."""
-    top = F(side - 1)
-    for k in range(xs.size):
-        x, y, aside = xs[k], ys[k], abs(slips[k])
+        x = vx * a0 + vy * a1 + omega * a2
+        y = vx * b0 + vy * b1 + omega * b2
+        aside = abs(vx * c0 + vy * c1 + omega * c2)
         ax, ay = abs(x), abs(y)
         on_x = ax > ay
         m = ax if on_x else ay
@@ -131,20 +124,51 @@ def _cells_of_square(
 
 
 @njit(cache=True, error_model="numpy")
-def _look(table: Array, cell: Array, found: Array) -> None:
-    for k in range(cell.size):
+def _look(table: Array, cell: Array, found: Array, ahead: Array) -> None:
+    """Look cells up, and ask for the twists that come next meanwhile."""
+    for first in range(0, cell.size - STRIDE + 1, STRIDE):
+        for at in range(0, 3 * STRIDE, LINE // ahead.itemsize):
+            prefetch(ahead, 3 * first + at)
+        for k in range(first, first + STRIDE):
+            found[k] = table[U(cell[k])]
+    for k in range(cell.size // STRIDE * STRIDE, cell.size):
         found[k] = table[U(cell[k])]
 
 
 @njit(cache=True, error_model="numpy")
-def _decide(found: Array, q: Array, out: Array) -> None:
+def _decide(found: Array, q: Array, codes: Array) -> None:
     """0 refused, 1 permitted, `OPEN` between the thresholds."""
     for k in range(found.size):
         low, high = F(I32(found[k] & U(0xFFFF))), F(I32(found[k] >> U(16)))
         above = ((q[k] > high) & (high < F(65535))) | (q[k] == FAR)
         code = B(1) if q[k] <= low else B(OPEN)
         code = B(0) if above else code
-        out[k] = code if q[k] >= ZERO else B(OPEN)
+        codes[k] = code if q[k] >= ZERO else B(OPEN)
+
+
+@njit(cache=True)
+def _collect(codes: Array, words: Array, count: int, open_: Array) -> int:
+    """Write which of the first `count` codes are `OPEN`; return how many.
+
+    `words` are the same codes, eight at a time. `open_` needs room for eight more.
+    """
+    waiting = np.int64(0)
+    for w in range((count + 7) // 8):
+        if words[w] & ANY_OPEN:
+            for k in range(8 * w, 8 * w + 8):
+                open_[waiting] = k
+                waiting += np.int64(codes[k] >> 1)
+    # Beyond the end may be codes of the part before.
+    while waiting > 0 and open_[waiting - 1] >= count:
+        waiting -= 1
+    return waiting
+
+
+@njit(cache=True)
+def _hand_over(codes: Array, out: Array) -> None:
+    """Copy; assigning slices takes several times as long."""
+    for k in range(codes.size):
+        out[k] = codes[k]
 
 
 @njit(cache=True, nogil=RELEASES_LOCK)
@@ -175,44 +199,39 @@ def check(
     shift, to_plane = forms
     is_bound = bound[0] + bound[1] > 0
     n = out.size
-    room = min(n, PART)
-    x, y, z = np.empty(room, F), np.empty(room, F), np.empty(room, F)
-    cell, q, found = np.empty(room, I32), np.empty(room, F), np.empty(room, U)
-    open_ = np.empty(room + 1, I32)
+    cell, q, found = np.empty(PART, I32), np.empty(PART, F), np.empty(PART, U)
+    codes, open_ = np.zeros(PART, B), np.empty(PART + 8, I32)
+    words = codes.view(np.uint64)
+    room = (np.empty(PART), np.empty(PART), np.empty(PART))
     for start in range(0, n, PART):
         stop = min(n, start + PART)
         count = stop - start
         part = twists[3 * start : 3 * stop]
-        xs, ys, zs = x[:count], y[:count], z[:count]
-        cells, qs, results = cell[:count], q[:count], out[start:stop]
         if is_bound:
-            _on_square(part, xs, ys, zs, to_plane)
             _cells_of_square(
-                xs, ys, zs, cells, qs, F(scale), F(half), I32(side),
+                part, cell[:count], q[:count], to_plane, F(scale), F(half), I32(side),
                 F(bound[3] * bound[3]), F(bound[4]), F(guard),
             )  # fmt: skip
         else:
-            _on_cube(part, xs, ys, zs, shift[0], shift[1], shift[2])
             _cells_of_cube(
-                xs, ys, zs, cells, qs, F(scale), F(half), I32(side), I32(signed)
-            )
-        _look(table, cells, found[:count])
-        _decide(found[:count], qs, results)
-        waiting = np.int64(0)
-        for first in range(0, count, WIDE):
-            some = B(0)
-            for k in range(first, min(first + WIDE, count)):
-                some |= results[k]
-            if some & B(OPEN):
-                for k in range(first, min(first + WIDE, count)):
-                    open_[waiting] = k
-                    waiting += np.int64(results[k] >> 1)
-        bad = settle(
-            part, open_, waiting, results, point, bound, tables, loads, sectors,
-            is_exact,
-        )  # fmt: skip
-        if bad >= 0:
-            return int(start + bad)
+                part, cell[:count], q[:count], shift[0], shift[1], shift[2],
+                F(scale), F(half), I32(side), I32(signed),
+            )  # fmt: skip
+        next_ = 3 * min(stop, n - count)
+        ahead = twists[next_ : next_ + 3 * count]
+        _look(table, cell[:count], found[:count], ahead)
+        _decide(found[:count], q[:count], codes[:count])
+        waiting = _collect(codes, words, count, open_)
+        if waiting > 0 and not is_bound:
+            waiting = narrow(part, open_, waiting, codes, point, tables, room)
+        if waiting > 0:
+            bad = settle(
+                part, open_, waiting, codes, point, bound, tables, loads, sectors,
+                is_exact,
+            )  # fmt: skip
+            if bad >= 0:
+                return int(start + bad)
+        _hand_over(codes[:count], out[start:stop])
     return -1
 
 

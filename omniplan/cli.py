@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from omniplan.report import Ranking, Report
     from omniplan.timing_result import Timing
     from omniplan.trajectory import Trajectory
-    from services import Server
+    from services import Client, Security, Server
 
 __all__ = ["main"]
 
@@ -120,18 +120,37 @@ def _parser() -> argparse.ArgumentParser:
 
     query = command("query", _query, "ask a server")
     query.add_argument(
-        "what", choices=["health", "vehicles", "check", "select", "sheet"]
+        "what", choices=["health", "vehicles", "check", "many", "select", "sheet"]
     )
     query.add_argument(
         "trajectories", nargs="*", type=Path, help="CSV or Parquet files"
     )
     query.add_argument("--vehicle", help="for check and sheet")
-    query.add_argument("--fleet", nargs="+", metavar="VEHICLE", help="for select")
+    query.add_argument(
+        "--fleet", nargs="+", metavar="VEHICLE", help="for many and select"
+    )
     _ranking_arguments(query)
-    query.add_argument("--output", type=Path, help="for sheet: the file to write")
+    query.add_argument(
+        "--allow-unreachable", action="store_true", help="for check, many and select"
+    )
+    query.add_argument(
+        "--online-only", action="store_true", help="for select: vehicles online now"
+    )
+    query.add_argument(
+        "--output",
+        type=Path,
+        help="the file to write: a sheet, or for many the verdicts, FILE.parquet",
+    )
     query.add_argument("--site", default="default")
-    query.add_argument("--connect", default=DEFAULT_ENDPOINT, help="%(default)s")
+    query.add_argument(
+        "--connect",
+        nargs="+",
+        default=[DEFAULT_ENDPOINT],
+        metavar="ENDPOINT",
+        help=f"where servers of the site listen, any may answer; {DEFAULT_ENDPOINT}",
+    )
     query.add_argument("--timeout", type=float, default=10.0, help="%(default)s s")
+    _certificate_arguments(query)
 
     export = command("export", _export, "write a vehicle's data sheet or its solid")
     export.add_argument("vehicle", help="catalogue name or vehicle file")
@@ -140,7 +159,11 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     schema = command("schema", _schema, "print a JSON Schema")
-    schema.add_argument("what", choices=["service", "vehicle"])
+    schema.add_argument(
+        "what",
+        help="vehicle; service: its configuration; messages: the names of all messages "
+        "of the service, or one of them",
+    )
 
     bench = command("bench", _bench, "measure batches on this machine")
     bench.add_argument(
@@ -403,16 +426,58 @@ def _fleet_of_entries(
     return [*spaces, *(s for folder in folders for s in fleet_of_folder(folder))]
 
 
+def _certificate_arguments(command: argparse.ArgumentParser) -> None:
+    for name, what in (
+        ("ca", "the authority's certificate"),
+        ("certificate", "ours"),
+        ("key", "its key"),
+    ):
+        command.add_argument(
+            f"--{name}", type=Path, metavar="FILE.pem", help=f"for tls/: {what}"
+        )
+    command.add_argument(
+        "--trust",
+        nargs="+",
+        default=(),
+        metavar="NAME",
+        help="for tls/: names on the certificates of servers; others are not asked",
+    )
+
+
+def _security(options: argparse.Namespace) -> Security | None:
+    """Return the certificates that are given; all three files or none."""
+    from configspace import InvalidInput, Problem
+    from services import Roles, Security
+
+    files = {name: getattr(options, name) for name in ("ca", "certificate", "key")}
+    if not any(files.values()) and not options.trust:
+        return None
+    missing = [
+        Problem(f"--{name}", "not given", "ca, certificate and key together")
+        for name, path in files.items()
+        if path is None
+    ]
+    if missing:
+        raise InvalidInput(missing)
+    return Security(**files, roles=Roles(servers=tuple(options.trust)))
+
+
 def _query(options: argparse.Namespace) -> int:
     from configspace import InvalidInput, Problem
     from services import Client
 
     needs = {"check": ("vehicle", "trajectories"), "select": ("trajectories",)}
     needs["sheet"] = ("vehicle", "output")
+    needs["many"] = ("trajectories", "output")
     for name in needs.get(options.what, ()):
         if not getattr(options, name):
             raise InvalidInput(Problem(f"query {options.what}", f"no {name}", "needed"))
-    with Client(options.connect, site=options.site, timeout=options.timeout) as client:
+    with Client(
+        options.connect,
+        site=options.site,
+        timeout=options.timeout,
+        security=_security(options),
+    ) as client:
         if options.what == "health":
             _print_json(client.health().model_dump())
         elif options.what == "vehicles":
@@ -423,15 +488,56 @@ def _query(options: argparse.Namespace) -> int:
             _say(f"wrote {options.output}", options.json)
         elif options.what == "check":
             trajectories = _trajectories(options.trajectories, None)
-            reports = client.validate(trajectories, options.vehicle)
+            allow = options.allow_unreachable
+            reports = client.validate(
+                trajectories, options.vehicle, allow_unreachable=allow
+            )
             return _answer_reports(reports, options.json)
+        elif options.what == "many":
+            return _query_many(client, options)
         else:
             trajectories = _trajectories(options.trajectories, None)
             rankings = client.select(
-                trajectories, options.fleet, options.by, requirements=options.require
+                trajectories,
+                options.fleet,
+                options.by,
+                requirements=options.require,
+                allow_unreachable=options.allow_unreachable,
+                online_only=options.online_only,
             )
             return _answer_rankings(rankings, options.json)
     return YES
+
+
+def _query_many(client: Client, options: argparse.Namespace) -> int:
+    """Ask about a whole batch, and write the verdicts."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    from pyarrow import parquet
+    from rich.progress import Progress
+
+    from configspace import OmniplanError
+
+    trajectories = _trajectories(options.trajectories, None)
+    with Progress(console=_progress_console(), transient=True) as bar:
+        task = bar.add_task("Judging", total=None)
+        table = client.validate_many(
+            trajectories,
+            options.fleet,
+            allow_unreachable=options.allow_unreachable,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    try:
+        parquet.write_table(table, options.output)
+    except (OSError, pa.ArrowException) as error:
+        raise OmniplanError(f"cannot write {options.output}: {error}") from error
+    valid = pc.sum(table["valid"]).as_py() or 0
+    if options.json:
+        found = {"output": str(options.output), "pairs": table.num_rows, "valid": valid}
+        _print_json(found)
+    else:
+        print(f"{valid} of {table.num_rows} pairs are valid; wrote {options.output}")
+    return YES if valid == table.num_rows else NO
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -449,9 +555,15 @@ def _export(options: argparse.Namespace) -> int:
 def _schema(options: argparse.Namespace) -> int:
     from configspace import vehicle_schema
     from services.config import service_schema
+    from services.schemas import MESSAGES, message_schema
 
     schemas = {"service": service_schema, "vehicle": vehicle_schema}
-    _print_json(schemas[options.what]())
+    if options.what == "messages":
+        _print_json(list(MESSAGES)) if options.json else print("\n".join(MESSAGES))
+    elif options.what in schemas:
+        _print_json(schemas[options.what]())
+    else:
+        _print_json(message_schema(options.what))
     return YES
 
 

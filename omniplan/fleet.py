@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Literal, TypeAlias, get_args
 
 from configspace import ClearanceMap, InvalidInput, PermissibleSpace, Problem
+from omniplan.faults import Undrivable
 from omniplan.fitness import (
     FleetEntry,
     FleetVehicle,
@@ -22,16 +23,19 @@ from omniplan.path import Path
 from omniplan.report import Candidate, Ranking, Report
 from omniplan.requirements import NoMirroring, PassableBackwards, Requirement
 from omniplan.shortfalls import Shortfall, Unfit
+from omniplan.timing import time_paths
 from omniplan.trace import Proved, prove
-from omniplan.trajectory import Trajectory, timed
+from omniplan.trajectory import Trajectory
 from omniplan.validation import validate
 
-__all__ = ["Criterion", "FleetVehicle", "ranked_by", "select"]
+__all__ = ["Criterion", "FleetVehicle", "ranked_by", "select", "time_for"]
 
 Criterion: TypeAlias = Literal["duration", "margin", "manoeuvrability"]
 """What `select` can rank by."""
 Score: TypeAlias = Callable[[Report], float]
 """A criterion of one's own; smaller is better."""
+NOT_KNOWN = "vehicle not known"
+"""Status of a path for a data sheet alone."""
 
 
 def select(
@@ -44,19 +48,21 @@ def select(
 ) -> tuple[Ranking, ...]:
     """Rank the vehicles of a fleet for each trajectory.
 
-    Vehicles whose spaces are made of the same vehicle are judged once.
+    Vehicles whose spaces are made of the same vehicle are judged once. A path is timed
+    for each of them, see `fastest`, and judged so.
 
     Parameters
     ----------
-    trajectories : Trajectory or iterable of Trajectory
+    trajectories : Trajectory, Path, or iterable of them
     fleet : iterable of FleetEntry
         Spaces, pairs of name and space or `FleetVehicle`; names must differ.
     by : {"duration", "margin", "manoeuvrability"} or callable
         ``duration``: how soon the vehicle can be there when it drives the whole
-        trajectory uniformly as fast as it may; ``margin``: how much it has left of its
-        limits; ``manoeuvrability``: by what angle it could change its direction of
-        motion at any moment, see `omniplan.manoeuvrability`. Or a function from a valid
-        `Report` to a number, smaller is better. Among equals the larger margin wins.
+        trajectory uniformly as fast as it may, or a path in its own fastest timing;
+        ``margin``: how much it has left of its limits; ``manoeuvrability``: by what
+        angle it could change its direction of motion at any moment, see
+        `omniplan.manoeuvrability`. Or a function from a valid `Report` to a number,
+        smaller is better. Among equals the larger margin wins.
     requirements : iterable of Requirement or str
         What a vehicle must meet besides: values of `omniplan.requirements` or their
         phrases. See `suitable` for requirements without trajectories.
@@ -67,15 +73,14 @@ def select(
     -------
     rankings : tuple of Ranking
         One per trajectory, in their order. Every vehicle is suitable, refused with its
-        report or unfit with what it falls short of.
+        report, unfit with what it falls short of or, for a path, undrivable with
+        what is in the way.
 
     Raises
     ------
     InvalidInput
         If the criterion is unknown or gives NaN, the fleet is empty, names repeat or a
         phrase cannot be read.
-    InvalidTrajectory
-        For a path: `fastest` gives it times.
 
     Examples
     --------
@@ -163,12 +168,31 @@ class _Question:
         """Name of the criterion."""
         return self._by if isinstance(self._by, str) else _called(self._by)
 
-    def verdict(self, trajectory: Trajectory, space: PermissibleSpace) -> _Verdict:
+    def verdict(
+        self, motion: Trajectory | Path, space: PermissibleSpace
+    ) -> _Verdict | Undrivable:
         """Return what is said of one vehicle type."""
+        allow = self._allow_unreachable
+        (answer,) = time_for((motion,), space, allow_unreachable=allow)
+        if isinstance(answer, Undrivable):
+            return answer
+        return self._judged(answer, space, is_fastest=isinstance(motion, Path))
+
+    def _judged(
+        self,
+        trajectory: Trajectory,
+        space: PermissibleSpace,
+        *,
+        is_fastest: bool = False,
+    ) -> _Verdict:
         allow = self._allow_unreachable
         report = validate(trajectory, space, allow_unreachable=allow)
         if not report.valid:
             return _Verdict(report, (), 0.0)
+        if is_fastest:  # what is left of the vehicle's limits, the path's may forbid
+            report = replace(
+                report, speed_factor=1.0, fastest_duration=trajectory.duration
+            )
 
         @cache
         def proved() -> Proved:
@@ -210,16 +234,19 @@ def _ranked(
     unfit: tuple[Unfit, ...],
     motion: Trajectory | Path,
 ) -> Ranking:
-    trajectory = timed(motion)
-    verdicts: dict[Hashable, _Verdict] = {}
+    verdicts: dict[Hashable, _Verdict | Undrivable] = {}
     suitable: list[Candidate] = []
     refused: list[Report] = []
     short: list[Unfit] = []
+    undrivable: list[Undrivable] = []
     for vehicle in fleet:
         key = _type_of(vehicle.space)
         if key not in verdicts:
-            verdicts[key] = question.verdict(trajectory, vehicle.space)
+            verdicts[key] = question.verdict(motion, vehicle.space)
         verdict = verdicts[key]
+        if isinstance(verdict, Undrivable):
+            undrivable.append(replace(verdict, vehicle=vehicle.id))
+            continue
         report = replace(verdict.report, vehicle=vehicle.id)
         if verdict.shortfalls:
             short.append(Unfit(vehicle.id, verdict.shortfalls))
@@ -229,12 +256,42 @@ def _ranked(
             refused.append(report)
     suitable.sort(key=lambda one: (one.score, -one.report.margin, one.vehicle))
     return Ranking(
-        trajectory=trajectory.name,
+        trajectory=motion.name,
         criterion=question.name,
         suitable=tuple(suitable),
         refused=tuple(refused),
         unfit=(*unfit, *short),
+        undrivable=tuple(undrivable),
     )
+
+
+def time_for(
+    motions: Sequence[Trajectory | Path],
+    space: PermissibleSpace,
+    *,
+    allow_unreachable: bool,
+) -> list[Trajectory | Undrivable]:
+    """Return motions with times: paths get those of the vehicle, if it has any.
+
+    Parameters
+    ----------
+    motions : sequence of Trajectory or Path
+    space : PermissibleSpace
+    allow_unreachable : bool
+        As for `fastest`.
+    """
+    found: dict[int, Trajectory | Undrivable] = {}
+    paths = {i: one for i, one in enumerate(motions) if isinstance(one, Path)}
+    if space.vehicle is None:
+        found = dict.fromkeys(paths, Undrivable(space.name, NOT_KNOWN, None))
+    else:
+        timings = time_paths(paths.values(), space, allow_unreachable=allow_unreachable)
+        for i, timing in zip(paths, timings, strict=True):
+            found[i] = timing.trajectory or timing.refusal()
+    return [
+        one if isinstance(one, Trajectory) else found[i]
+        for i, one in enumerate(motions)
+    ]
 
 
 def _type_of(space: PermissibleSpace) -> Hashable:

@@ -22,7 +22,8 @@ import numpy.typing as npt
 from configspace import ClearanceMap, PermissibleSpace, clearance_map
 from configspace.omni_curve import curvature_of_ratio
 from omniplan.chords import Chord, speed_of
-from omniplan.motion import HEADING_LENGTH, Enclosure
+from omniplan.motion import Enclosure
+from omniplan.samples import HEADING_LENGTH
 from omniplan.trace import Proved
 
 __all__ = ["fleet_clearance", "reserve"]

@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 from configspace import Vehicle, exact_v_max
 from configspace.exact import active_rows
 from configspace.limits import rows_of
+from omniplan.samples import HEADING_LENGTH
 from omniplan.swing import Directions, Swing, directions_of_legs, factored
 from omniplan.trajectory import Trajectory
 
@@ -46,8 +47,6 @@ STOP_TURN = np.radians(60)
 REST_SHARE = 0.25
 """A motion that starts at less than this share of its first step's speed starts at
 rest."""
-HEADING_LENGTH = 0.5
-"""Metres that one radian of heading counts in that comparison."""
 
 
 @dataclass(frozen=True)

@@ -49,12 +49,13 @@ class Path:
     reference_point: tuple[float, float]
     """The point of the vehicle that the poses describe, in its file's frame, m."""
     max_speed: FloatArray | None
-    """(n - 1,) m/s, > 0: cap on the speed of the reference point between two poses,
-    inf where there is none; None: no cap anywhere."""
+    """(n - 1,) m/s, > 0: cap on the speed between two poses, of whichever corner of the
+    vehicle's footprint or the reference point is fastest; of the reference point alone
+    for vehicles without a footprint. inf where there is none; None: no cap anywhere."""
     stops: BoolArray
     """(n,) where the vehicle must stand; cusps and corners need not be marked."""
     max_yaw_rate: FloatArray | None = None
-    """(n - 1,) rad/s, > 0: cap on the yaw rate, likewise."""
+    """(n - 1,) rad/s, > 0: cap on |ω|, likewise."""
 
     @classmethod
     def from_poses(
@@ -78,7 +79,7 @@ class Path:
         reference_point : (float, float), m
             The point described, in the frame of the vehicle files.
         max_speed : float or (n - 1,) float, m/s, > 0, optional
-            Cap on the speed of the reference point between two poses; inf: none.
+            Cap on the speed of the vehicle's fastest point, pose to pose; inf: none.
         max_yaw_rate : float or (n - 1,) float, rad/s, > 0, optional
         stops : (k,) int, [0, n)
             Rows where the vehicle must stand.

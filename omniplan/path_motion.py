@@ -43,7 +43,7 @@ class PathPiece:
     point: complex
     """The path's reference point in the frame of the vehicle's file, m."""
     max_speed: FloatArray
-    """(k - 1,) m/s, cap on the speed of the reference point; inf: none."""
+    """(k - 1,) m/s, cap on the speed of the vehicle's fastest point; inf: none."""
     max_yaw_rate: FloatArray
     """(k - 1,) rad/s, cap on |ω|; inf: none."""
 

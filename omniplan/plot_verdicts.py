@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from configspace import InvalidInput, Problem
+from omniplan.faults import Undrivable
 from omniplan.plot_style import new_figure, plain
 from omniplan.report import Ranking, Report
 from omniplan.shortfalls import Unfit
@@ -72,24 +73,28 @@ def plot_verdicts(rankings: Sequence[Ranking]) -> Figure:
     return figure
 
 
-def verdicts(rankings: Sequence[Ranking]) -> dict[tuple[str, int], Report | Unfit]:
+def verdicts(
+    rankings: Sequence[Ranking],
+) -> dict[tuple[str, int], Report | Unfit | Undrivable]:
     """Return what every cell shows, by vehicle and number of the ranking."""
-    cells: dict[tuple[str, int], Report | Unfit] = {}
+    cells: dict[tuple[str, int], Report | Unfit | Undrivable] = {}
     for column, ranking in enumerate(rankings):
         suitable = [candidate.report for candidate in ranking.suitable]
         for report in (*suitable, *ranking.refused):
             cells[report.vehicle, column] = report
         for unfit in ranking.unfit:
             cells[unfit.vehicle, column] = unfit
+        for undrivable in ranking.undrivable:
+            cells[undrivable.vehicle, column] = undrivable
     return cells
 
 
-def verdict_text(report: Report | Unfit) -> str:
+def verdict_text(report: Report | Unfit | Undrivable) -> str:
     """Return what a cell of the verdicts says.
 
     Parameters
     ----------
-    report : Report or Unfit
+    report : Report, Unfit or Undrivable
 
     Returns
     -------
@@ -99,18 +104,30 @@ def verdict_text(report: Report | Unfit) -> str:
     """
     if isinstance(report, Unfit):
         return f"unfit:\n{plain(report.shortfalls[0].requirement, 24)}"
+    if isinstance(report, Undrivable):
+        if report.fault is None:
+            return report.status
+        return _limit_text(report.fault.limit, report.fault.wheel)
     if report.valid:
         fastest = report.fastest_duration
         return f"{report.duration if fastest is None else fastest:.3g} s"
     first = report.headline
     if first is None:
         return "refused"
-    limit = first.limit.lower().replace("_", " ").replace("steer ", "steering ")
-    return f"{limit}\n{plain(first.wheel or 'vehicle', 22)}"
+    return _limit_text(first.limit, first.wheel)
+
+
+def _limit_text(limit: str, wheel: str | None) -> str:
+    name = limit.lower().replace("_", " ").replace("steer ", "steering ")
+    return f"{name}\n{plain(wheel or 'vehicle', 22)}"
 
 
 def _draw_cell(
-    axes: Axes, column: int, row: int, report: Report | Unfit | None, is_best: bool
+    axes: Axes,
+    column: int,
+    row: int,
+    report: Report | Unfit | Undrivable | None,
+    is_best: bool,
 ) -> None:
     corner = (column - 0.47, row - 0.44)
     if report is None:

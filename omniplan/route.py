@@ -39,8 +39,6 @@ TURN_STEP = math.pi / 4
 """Largest turn from pose to pose on the spot, rad."""
 REVERSAL = math.radians(150)
 """A tangent that turns by more goes back: the vehicle reverses, and need not turn."""
-REACH = 8
-"""How many poses to either side a new one is taken to matter; all are checked last."""
 SHARE = 0.8
 """Share of the tolerance that is used: the rest is for what lies between probes."""
 PROBES = np.arange(1, 12) / 12
@@ -320,22 +318,17 @@ class _Sampler:
 
     def sampled(self) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, 3) and caps (2, n - 1)."""
-        rows = np.arange(self._piece.size)
         while True:
             start = self._poses(self._piece, self._w0)
             end = self._poses(self._piece[-1:], self._w1[-1:])
             poses = np.concatenate([start, end])
-            off = np.zeros(self._piece.size, dtype=bool)
-            off[rows] = self._wide(poses, rows) | self._off(poses, rows)
-            if off.any():
-                rows = self._halve(off, poses)
-            elif rows.size < off.size:
-                rows = np.arange(off.size)  # all of them once more, to be sure
-            else:
+            off = self._wide(poses) | self._off(poses)
+            if not off.any():
                 return poses, self._caps[:, self._piece]
+            self._halve(off, poses)
 
-    def _halve(self, off: npt.NDArray[np.bool_], poses: FloatArray) -> IntArray:
-        """Cut the gaps between poses that are off; return those that may change."""
+    def _halve(self, off: npt.NDArray[np.bool_], poses: FloatArray) -> None:
+        """Cut the gaps between poses that are off."""
         chord = np.abs(np.diff(poses[:, 0] + 1j * poses[:, 1]))
         if self._piece.size > MAX_POSES or (chord[off] < LEAST_CHORD).any():
             x, y, _ = poses[int(np.flatnonzero(off)[chord[off].argmin()])]
@@ -355,9 +348,6 @@ class _Sampler:
         self._piece = np.insert(self._piece, at + 1, self._piece[at])
         self._w0 = np.insert(self._w0, at + 1, middle)
         self._w1 = np.insert(w1, at + 1, self._w1[at])
-        cut = at + np.arange(at.size)
-        near = cut[:, None] + np.arange(-REACH, REACH + 2)
-        return np.unique(np.clip(near, 0, self._piece.size - 1))
 
     def _poses(self, piece: IntArray, w: FloatArray) -> FloatArray:
         """Return the poses of pieces at places w, (..., 3)."""
@@ -368,19 +358,19 @@ class _Sampler:
         poses[..., 2] += self._shift[piece].reshape(-1, *[1] * (w.ndim - 1))
         return poses
 
-    def _wide(self, poses: FloatArray, rows: IntArray) -> npt.NDArray[np.bool_]:
-        """Return behind which of some poses tangent or heading turn far."""
-        turn = np.empty(rows.size)
-        for k in np.unique(self._piece[rows]):
-            mask = self._piece[rows] == k
+    def _wide(self, poses: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return behind which poses tangent or heading turn far."""
+        turn = np.empty(self._piece.size)
+        for k in np.unique(self._piece):
+            mask = self._piece == k
             before, behind = (
-                self._pieces[k].direction(w[rows[mask]]) for w in (self._w0, self._w1)
+                self._pieces[k].direction(w[mask]) for w in (self._w0, self._w1)
             )
             turn[mask] = np.abs(np.angle(behind / before))
-        return (turn > WIDE_TURN) | (np.abs(np.diff(poses[:, 2]))[rows] > WIDE_TURN)
+        return (turn > WIDE_TURN) | (np.abs(np.diff(poses[:, 2])) > WIDE_TURN)
 
-    def _off(self, poses: FloatArray, rows: IntArray) -> npt.NDArray[np.bool_]:
-        """Return behind which of some poses the spline is off by too much."""
+    def _off(self, poses: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return behind which poses the spline is off by too much."""
         steps = np.linalg.norm(np.diff(poses, axis=0) * [1, 1, HEADING_LENGTH], axis=1)
         if (steps <= 0).any():
             x, y, _ = poses[int(steps.argmin())]
@@ -393,8 +383,8 @@ class _Sampler:
             if len(u) > 3
             else CubicSpline(u, poses, bc_type="natural")
         )
-        on_spline = spline(u[rows, None] + steps[rows, None] * PROBES)
-        on_curve = self._nearest(on_spline, rows)
+        on_spline = spline(u[:-1, None] + steps[:, None] * PROBES)
+        on_curve = self._nearest(on_spline)
         gap = on_spline - on_curve
         distance = np.hypot(gap[..., 0], gap[..., 1]).max(axis=1)
         turn = np.abs(gap[..., 2]).max(axis=1)
@@ -403,10 +393,10 @@ class _Sampler:
             | (turn > SHARE * self._tolerance.heading)
         )
 
-    def _nearest(self, target: FloatArray, rows: IntArray) -> FloatArray:
-        """Return the poses of the curves nearest to probes, (len(rows), n, 3)."""
+    def _nearest(self, target: FloatArray) -> FloatArray:
+        """Return the poses of the curves nearest to probes, (m, n, 3)."""
         point = target[..., 0] + 1j * target[..., 1]
-        piece, w0, w1 = (x[rows] for x in (self._piece, self._w0, self._w1))
+        piece, w0, w1 = self._piece, self._w0, self._w1
         reach = (w1 - w0)[:, None]
         low = np.maximum(w0[:, None] - reach, 0.0)
         high = np.minimum(w1[:, None] + reach, 1.0)

@@ -84,7 +84,7 @@ class Directions:
             third = l_[2] + 3 * l_[0] * l_[1] + 2 * l_[0] ** 3
         ends = np.where(np.isfinite(ends), ends, 0.0)
         _, bend = self.accelerations(point)
-        excess = _least(self.dt / 2 * bend, self.dt**2 / 8 * third)
+        excess = self._least(bend, third)
         return ends, np.abs(ends).max(axis=0) + excess
 
     def accelerations(self, point: complex) -> tuple[FloatArray, FloatArray]:
@@ -104,16 +104,18 @@ class Directions:
             fourth = l_[3] + 4 * l_[0] * l_[2] + 3 * l_[1] ** 2
             fourth = fourth + 12 * l_[0] ** 2 * l_[1] + 6 * l_[0] ** 4
         ends = np.where(np.isfinite(ends), ends, 0.0)
-        excess = _least(self.dt / 2 * third, self.dt**2 / 8 * fourth)
+        excess = self._least(third, fourth)
         return ends, np.abs(ends).max(axis=0) + excess
 
+    def _least(self, slope: FloatArray, bend: FloatArray) -> FloatArray:
+        """Return by how much values may exceed those at the ends, by either bound.
 
-def _least(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the smaller of two excesses; 0 times infinity is no bound."""
-    with np.errstate(invalid="ignore"):
-        return np.where(
-            np.isfinite(first) & np.isfinite(second), np.minimum(first, second), np.inf
-        )
+        Infinite where one is not known, even if the part is a mere instant.
+        """
+        is_known = np.isfinite(slope) & np.isfinite(bend)
+        slope, bend = np.where(is_known, slope, 0.0), np.where(is_known, bend, 0.0)
+        excess = np.minimum(self.dt / 2 * slope, self.dt**2 / 8 * bend)
+        return np.where(is_known, excess, np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,10 @@ def show_ranking(ranking: Ranking, console: Console) -> None:
         )
         for advice in report.advice:
             console.print(f"   advice: {escape(advice.text)}", soft_wrap=True)
+    for one in ranking.undrivable:
+        console.print(
+            f"no [bold]{escape(one.vehicle)}[/]: {escape(str(one))}", soft_wrap=True
+        )
     _show_unfit(ranking.unfit, console)
 
 

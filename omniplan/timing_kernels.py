@@ -40,9 +40,10 @@ REST = 1e-9
 
 _SIZE, _COMPONENT, _YAW = int(RowKind.SIZE), int(RowKind.COMPONENT), int(RowKind.YAW)
 _LATERAL, _STEER_RATE = int(RowKind.LATERAL), int(RowKind.STEER_RATE)
-_BESIDE, _COUPLED = int(RowKind.BESIDE), int(RowKind.COUPLED)
-_REVERSE, _PATH_SPEED = int(RowKind.REVERSE), int(RowKind.PATH_SPEED)
-_PATH_YAW, _SIZE_RATE = int(RowKind.PATH_YAW), int(RowKind.SIZE_RATE)
+_BESIDE, _REVERSE = int(RowKind.BESIDE), int(RowKind.REVERSE)
+_PATH_SPEED = int(RowKind.PATH_SPEED)
+_PATH_YAW, _PATH_POINT = int(RowKind.PATH_YAW), int(RowKind.PATH_POINT)
+_SIZE_RATE = int(RowKind.SIZE_RATE)
 _SIZE_UP, _SIZE_DOWN = int(RowKind.SIZE_UP), int(RowKind.SIZE_DOWN)
 _COMPONENT_RATE = int(RowKind.COMPONENT_RATE)
 _ALONG, _STEER_ACC = int(RowKind.ACCELERATION_ALONG), int(RowKind.STEER_ACCELERATION)
@@ -76,7 +77,7 @@ def evaluate_rows(
 
     Of rows that bound x alone b is the load and a is 0.
     """
-    kinds, points, turns, levers, scales = table
+    kinds, points, turns, levers, couplings, scales = table
     c3, c2, c1 = position[0, knot], position[1, knot], position[2, knot]
     p1 = (3 * c3 * h + 2 * c2) * h + c1
     p2, p3 = 6 * c3 * h + 2 * c2, 6 * c3
@@ -114,6 +115,9 @@ def evaluate_rows(
         if kind == _SIZE:
             b[j, end, r] = square * scale**2
             continue
+        if kind == _PATH_POINT:
+            b[j, end, r] = square / caps[0, knot] ** 2
+            continue
         if kind == _REVERSE:
             on_line = nx != 0.0 or ny != 0.0
             backward = gx * nx + gy * ny < 0 if on_line else sigma < 0
@@ -149,9 +153,7 @@ def evaluate_rows(
             b[j, end, r] = (alpha1 * scale) ** 2
         elif kind == _BESIDE:
             rolls = math.sqrt(square) - sigma * (t1 + alpha1) * levers[r]
-            b[j, end, r] = (rolls * scale) ** 2
-        elif kind == _COUPLED:
-            b[j, end, r] = ((math.sqrt(square) + abs(alpha1) * levers[r]) * scale) ** 2
+            b[j, end, r] = ((abs(rolls) + abs(alpha1) * couplings[r]) * scale) ** 2
         else:
             ex, ey = v2.real - t3 * wy, v2.imag + t3 * wx
             bend = ey * gx - ex * gy
@@ -394,7 +396,7 @@ def time_jobs(
     Parameters
     ----------
     table : tuple of arrays
-        kind, point, turn, lever, scale of `RowTable`.
+        kind, point, turn, lever, coupling, scale of `RowTable`.
     position, heading : (4, knots) cubic coefficients of all pieces
     point : (pieces,) the reference points of the paths
     caps : (2, knots) caps of the paths on speed and yaw rate

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omniplan.errors import NotDrivable
-from omniplan.timing_shape import Fault
+from omniplan.faults import Fault, Undrivable
 from omniplan.trajectory import Trajectory
 
 __all__ = ["SpeedProfile", "Timing", "TimingStatus"]
@@ -99,6 +99,10 @@ class Timing:
             "fault": None if self.fault is None else asdict(self.fault),
             "message": self.message,
         }
+
+    def refusal(self) -> Undrivable:
+        """Return why there is no trajectory, as a value that rankings hold."""
+        return Undrivable(self.vehicle, self.status.value, self.fault)
 
     def raise_for_status(self) -> Trajectory:
         """Return the trajectory.

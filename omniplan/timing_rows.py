@@ -59,15 +59,15 @@ class RowKind(enum.IntEnum):
     STEER_RATE = 4
     """``α'``"""
     BESIDE = 5
-    """``|g| - σ (θ' + α') D``"""
-    COUPLED = 6
-    """``|g| + k |α'|``"""
-    REVERSE = 7
+    """``||g| - σ (θ' + α') D| + k |α'|``"""
+    REVERSE = 6
     """``|g|``, where the vehicle drives backwards"""
-    PATH_SPEED = 8
+    PATH_SPEED = 7
     """speed of the path's own point, with the path's cap"""
-    PATH_YAW = 9
+    PATH_YAW = 8
     """``θ'``, with the path's cap"""
+    PATH_POINT = 9
+    """``|g|``, with the path's cap on speed"""
     SIZE_RATE = 16
     """``|g| ü + |g|' x``, both signs"""
     SIZE_UP = 17
@@ -107,7 +107,9 @@ class TimingRow:
     turn: complex = 1 + 0j
     """``n̄``, with the factor of a roller; of REVERSE that of the line, or 0."""
     lever: float = 0.0
-    """D or k, m."""
+    """D, m: how far left of its axis a wheel rolls."""
+    coupling: float = 0.0
+    """k, m: the share of motors that drive and steer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +120,7 @@ class RowTable:
     point: ComplexArray
     turn: ComplexArray
     lever: FloatArray
+    coupling: FloatArray
     scale: FloatArray
     """1 / bound."""
 
@@ -129,14 +132,21 @@ def row_table(rows: tuple[TimingRow, ...]) -> RowTable:
         np.array([row.point for row in rows], dtype=np.complex128),
         np.array([row.turn for row in rows], dtype=np.complex128),
         np.array([row.lever for row in rows], dtype=np.float64),
+        np.array([row.coupling for row in rows], dtype=np.float64),
         np.array([1 / row.bound for row in rows], dtype=np.float64),
     )
 
 
-def timing_rows(vehicle: Vehicle) -> tuple[TimingRow, ...]:
+def timing_rows(vehicle: Vehicle, *, has_caps: bool = True) -> tuple[TimingRow, ...]:
     """Return all limits of a vehicle that depend on how fast a path is passed.
 
     Rows that involve ü come last; the last one of all is ``SAMPLING``.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    has_caps : bool
+        Whether rows for the caps of a path are wanted.
 
     References
     ----------
@@ -146,8 +156,8 @@ def timing_rows(vehicle: Vehicle) -> tuple[TimingRow, ...]:
     for i, wheel in enumerate(vehicle.wheels):
         if not isinstance(wheel, Castor):
             rows += _wheel(vehicle.contacts[i], i, wheel)
-    rows.append(TimingRow("PATH_SPEED", -1, RowKind.PATH_SPEED, 1.0))
-    rows.append(TimingRow("PATH_YAW_RATE", -1, RowKind.PATH_YAW, 1.0))
+    if has_caps:
+        rows += _path(vehicle)
     rows.append(TimingRow("SAMPLING", -1, RowKind.SAMPLING, 1.0))
     return tuple(sorted(rows, key=lambda row: row.kind >= FIRST_RATE))
 
@@ -190,6 +200,14 @@ def _body(vehicle: Vehicle) -> Iterator[TimingRow]:
             )
 
 
+def _path(vehicle: Vehicle) -> Iterator[TimingRow]:
+    """Yield the rows of a path's caps: |v + j ω p| is largest at a corner."""
+    yield TimingRow("PATH_SPEED", -1, RowKind.PATH_SPEED, 1.0)
+    for x, y in vehicle.footprint:
+        yield TimingRow("PATH_SPEED", -1, RowKind.PATH_POINT, 1.0, complex(x, y))
+    yield TimingRow("PATH_YAW_RATE", -1, RowKind.PATH_YAW, 1.0)
+
+
 def _wheel(contact: complex, i: int, wheel: Wheel) -> Iterator[TimingRow]:
     """Yield the rows of a wheel; a castor has none."""
     if isinstance(wheel, SteerableWheel):
@@ -214,11 +232,16 @@ def _steered(contact: complex, i: int, wheel: SteerableWheel) -> Iterator[Timing
     if wheel.max_speed is not None:
         bound, coupling = wheel.max_speed, wheel.steering_coupling
         for offset in wheel.offsets:
-            kind = RowKind.BESIDE if offset else RowKind.SIZE
-            yield TimingRow("WHEEL_SPEED", i, kind, bound, contact, lever=offset)
-        if coupling:
-            kind = RowKind.COUPLED
-            yield TimingRow("WHEEL_SPEED", i, kind, bound, contact, lever=coupling)
+            kind = RowKind.BESIDE if offset or coupling else RowKind.SIZE
+            yield TimingRow(
+                "WHEEL_SPEED",
+                i,
+                kind,
+                bound,
+                contact,
+                lever=offset,
+                coupling=coupling,
+            )
     if wheel.max_acceleration is not None:
         bound = wheel.max_acceleration
         yield TimingRow("WHEEL_ACCELERATION", i, RowKind.SIZE_RATE, bound, contact)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import PermissibleSpace
+from omniplan.faults import Fault
 from omniplan.judge import judge_for
 from omniplan.path import Path
 from omniplan.path_motion import PathMotion, PathPiece
@@ -17,7 +18,7 @@ from omniplan.report import Report
 from omniplan.rows import Tolerances
 from omniplan.timing_result import SpeedProfile, Timing, TimingStatus
 from omniplan.timing_sampling import sample_piece
-from omniplan.timing_shape import Fault, PieceShape, first_fault, shape_of
+from omniplan.timing_shape import PieceShape, first_fault, shape_of
 from omniplan.timing_solver import PieceProfile, TimingProblem
 from omniplan.trajectory import Trajectory
 from omniplan.validation import validate
@@ -35,13 +36,15 @@ DWELL = 1e-4
 """Time at every stop, s, so that its pose is repeated and the stop cannot be missed."""
 LOSS = 4e-3
 """If a trajectory takes longer than the optimum by more than this share ..."""
-REFINEMENTS = (1, 1, 1, 2, 4)
+REFINEMENTS = (1, 1, 1, 1, 2, 4)
 """... it is timed again, slower where `validate` found a limit broken, and sampled more
 finely, so many times."""
 AROUND = 3
-"""So many samples before and after such a place are passed more slowly, too ..."""
+"""So many steps before and after such a place are passed more slowly, too ..."""
 SPARE = 1e-3
 """... and by this share more than was asked for."""
+MOST_PROVED, MOST_UNDECIDED = 1.25, 1.1
+"""... but at most so many times more slowly at once."""
 WAITS = 3
 """How often waits at stops are made longer as `validate` demands."""
 SHAPE_LIMITS = (
@@ -53,6 +56,9 @@ SHAPE_LIMITS = (
     "UNREACHABLE",
 )
 """Limits of the configuration, which driving slower does not mend."""
+
+
+BLOCKED, NO_WAY = TimingStatus.BLOCKED, TimingStatus.NO_WAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +102,7 @@ class Timer:
         shapes = [shape_of(piece, self._space, self._tolerances) for piece in pieces]
         fault = first_fault(shapes)
         if fault is not None:
-            return self._no(path, TimingStatus.BLOCKED, fault)
+            return self._no(path, BLOCKED, fault)
         options = [
             {
                 sign: profiles[k, sign]
@@ -114,7 +120,7 @@ class Timer:
                 return self._no(path, TimingStatus.STUCK, stuck)
         choice = self._choose(pieces, shapes, options)
         if isinstance(choice, Fault):
-            return self._no(path, TimingStatus.NO_WAY, choice)
+            return self._no(path, NO_WAY, choice)
         chosen, waits = choice
         profile = _joined(problem, chosen, waits, self._wheel_ids)
         tight = [np.ones(one.u.size) for one in chosen]
@@ -126,9 +132,11 @@ class Timer:
             if best is None or _worth(timing) < _worth(best):
                 best = timing
             lost = _worth(best) / profile.duration - 1
-            if lost < LOSS or timing.trajectory is None:
+            if lost < LOSS or timing.status in (BLOCKED, NO_WAY):
                 break
-            _tighten(tight, legs, chosen, report)
+            if report.speed_factor > 1 - SPARE:  # nothing is left to mend
+                break
+            _tighten(tight, legs, chosen, report, self._steps)
         assert best is not None
         return best
 
@@ -262,9 +270,9 @@ class Timer:
         pose = worst.pose or (0.0, 0.0, 0.0)
         fault = Fault(worst.limit, worst.wheel, u, pose, describe(worst))
         if worst.limit in SHAPE_LIMITS:
-            status = TimingStatus.BLOCKED
+            status = BLOCKED
         elif worst.limit == "RECONFIGURATION":
-            status = TimingStatus.NO_WAY
+            status = NO_WAY
         else:
             status = TimingStatus.NOT_PROVED
         message = f"{path.name} by {self._space.name}: {status.value}: {fault.text}"
@@ -287,6 +295,7 @@ def _tighten(
     legs: list[_Leg],
     chosen: list[PieceProfile],
     report: Report,
+    steps: int,
 ) -> None:
     """Make the limits tighter where a report says that they are broken."""
     slower = [np.ones(weight.size) for weight in tight]
@@ -297,8 +306,10 @@ def _tighten(
         factor = max(abs(violation.value) / violation.bound, 1.0) * (1 + SPARE)
         if violation.unit.endswith("s²"):
             factor = math.sqrt(factor)
+        # Near rest the samples' splines are to blame rather than the speed.
+        factor = min(factor, MOST_PROVED if violation.is_proved else MOST_UNDECIDED)
         for weight, leg, profile in zip(slower, legs, chosen, strict=True):
-            pad = AROUND * float(leg.t[1] - leg.t[0])
+            pad = AROUND * float(leg.t[-1] - leg.t[0]) / steps
             ends = violation.t_start - pad, violation.t_end + pad
             if ends[1] < leg.t[0] or ends[0] > leg.t[-1]:
                 continue

@@ -18,6 +18,7 @@ from configspace import PermissibleSpace
 from configspace.angles import wrap
 from configspace.omni_curve import curvature_of_ratio
 from configspace.vehicle import SteerableWheel
+from omniplan.faults import Fault
 from omniplan.judge import judge_for
 from omniplan.motion import Enclosure
 from omniplan.path_motion import PathMotion, PathPiece
@@ -26,38 +27,12 @@ from omniplan.rows import Bounds, Judge, Row, Tolerances, WindingWheel
 from omniplan.ways import Configuration
 from omniplan.wording import quantity
 
-__all__ = ["Fault", "PieceShape", "first_fault", "shape_of"]
+__all__ = ["PieceShape", "first_fault", "shape_of"]
 
 BoolArray = npt.NDArray[np.bool_]
 
 RATE = 10.0
 """u̇ of the motion that is judged, m/s: so fast that slip counts relative to speed."""
-
-
-@dataclass(frozen=True)
-class Fault:
-    """Why a path cannot be driven or timed, and where."""
-
-    limit: str
-    """As in `omniplan.Violation`."""
-    wheel: str | None
-    """Id of the wheel; None for the vehicle as a whole."""
-    u: float
-    """How far along the path, m (see `Path.parameter`)."""
-    pose: tuple[float, float, float]
-    """m, m, rad"""
-    text: str
-    """What is wrong, in words and numbers."""
-
-    def __str__(self) -> str:
-        """Return one line with wheel, limit, numbers and place."""
-        who = f"wheel {self.wheel}: " if self.wheel else ""
-        x, y, theta = self.pose
-        return (
-            f"{who}{self.text}, at x = {x:.2f} m, y = {y:.2f} m, "
-            f"θ = {math.degrees(theta):.0f}°, {self.u:.2f} m along the path "
-            f"[{self.limit}]"
-        )
 
 
 @dataclass(frozen=True)

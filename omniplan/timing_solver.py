@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from configspace import Vehicle
 from omniplan.path_motion import PathPiece
 from omniplan.timing_kernels import rows_along, time_jobs
-from omniplan.timing_rows import ONE_SIDED, TimingRow, row_table, timing_rows
+from omniplan.timing_rows import ONE_SIDED, RowKind, TimingRow, row_table, timing_rows
 
 __all__ = ["PieceProfile", "TimingProblem"]
 
@@ -70,16 +71,24 @@ class TimingProblem:
             Least number of intervals per piece.
         """
         self.pieces = tuple(pieces)
-        self.rows: tuple[TimingRow, ...] = timing_rows(vehicle)
+        speeds = np.concatenate([p.max_speed for p in pieces])
+        yaw_rates = np.concatenate([p.max_yaw_rate for p in pieces])
+        self._caps = np.stack([speeds, yaw_rates])
+        has_caps = bool(np.isfinite(self._caps).any())
+        self.rows: tuple[TimingRow, ...] = timing_rows(vehicle, has_caps=has_caps)
         table = row_table(self.rows)
-        self._table = (table.kind, table.point, table.turn, table.lever, table.scale)
+        self._table = (
+            table.kind,
+            table.point,
+            table.turn,
+            table.lever,
+            table.coupling,
+            table.scale,
+        )
         self._one_sided = np.array([row.kind in ONE_SIDED for row in self.rows])
         self._position = np.concatenate([p.position for p in pieces], axis=1)
         self._heading = np.concatenate([p.heading for p in pieces], axis=1)
         self._point = np.array([p.point for p in pieces], dtype=np.complex128)
-        speeds = np.concatenate([p.max_speed for p in pieces])
-        yaw_rates = np.concatenate([p.max_yaw_rate for p in pieces])
-        self._caps = np.stack([speeds, yaw_rates])
         self._offsets = np.cumsum([0, *(p.u.size - 1 for p in pieces)])
         knots, h0, h1 = zip(*(_grid(piece, grid) for piece in pieces), strict=True)
         self._knot = np.concatenate(
@@ -89,6 +98,25 @@ class TimingProblem:
         self._first = np.cumsum([0, *(k.size for k in knots)]).astype(np.int64)
         self._u = np.concatenate([self._nodes(k) for k in range(len(pieces))])
         self._most_nodes = int(np.diff(self._first).max()) + 1
+
+    @cached_property
+    def _steering(self) -> npt.NDArray[np.bool_]:
+        return np.array([row.kind == RowKind.STEER_ACCELERATION for row in self.rows])
+
+    @property
+    def bounds_steering_acceleration(self) -> bool:
+        """Whether third derivatives of the samples' splines matter."""
+        return bool(self._steering.any())
+
+    def steering_gain(self, piece: int, sigma: int, u: FloatArray) -> FloatArray:
+        """Return the largest |α'| over the wheel's limit on α̈, (n,) s²/m.
+
+        Parameters
+        ----------
+        u : (n,) float, m
+        """
+        a, _ = self.coefficients(piece, sigma, u)
+        return np.asarray(np.abs(a[:, self._steering]).max(axis=1))
 
     def nodes(self, piece: int) -> FloatArray:
         """Return the grid of a piece, (n,) m from the start of the path."""

@@ -26,6 +26,7 @@ __all__ = [
     "Header",
     "Table",
     "columns_of",
+    "each_of",
     "header_of",
     "merged",
     "span",
@@ -125,7 +126,11 @@ def trajectories_of(
     InvalidTrajectory
         With the rows and what is wrong in them.
     """
-    found = []
+    return tuple(each_of(table, vehicle))
+
+
+def each_of(table: Table, vehicle: Vehicle | None) -> Iterator[Trajectory | Path]:
+    """Yield what `trajectories_of` returns, one after the other."""
     for name, rows in _groups(table):
         first, last = (
             (rows.start, rows.stop - 1)
@@ -134,11 +139,10 @@ def trajectories_of(
         )
         columns = {key: values[rows] for key, values in table.columns.items()}
         try:
-            found.append(_built(name, table.header, columns, vehicle))
+            yield _built(name, table.header, columns, vehicle)
         except InvalidInput as error:
             subject = f"{table.source} ({table.place(first, last)})"
             raise InvalidTrajectory(error.problems, subject) from error
-    return tuple(found)
 
 
 def _groups(table: Table) -> Iterator[tuple[str, slice | IntArray]]:

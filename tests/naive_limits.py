@@ -227,7 +227,7 @@ def off_middle(wheel: SteerableWheel, alpha: FloatArray) -> tuple[FloatArray, fl
 def steering_uses(
     sim: Simulation, i: int, wheel: SteerableWheel, piece: Piece, alpha: FloatArray
 ) -> Iterator[Use]:
-    """Steering rate and what the guaranteed rates ask of it."""
+    """Steering rate, its change, and what the guaranteed rates ask of it."""
     rows, t = piece.rows, sim.t[piece.rows]
     if wheel.max_steering_rate_deg is not None:
         limit = math.radians(wheel.max_steering_rate_deg)
@@ -235,6 +235,9 @@ def steering_uses(
         if len(t) > 1:
             mean = np.abs(np.diff(alpha)) / np.diff(t)
             yield use("STEER_RATE", wheel.id, mean, limit, t[:-1])
+    if wheel.max_steering_acceleration_deg is not None and sim.ahead is not None:
+        limit = math.radians(wheel.max_steering_acceleration_deg)
+        yield use("STEER_ACCELERATION", wheel.id, sim.swinging(i)[rows], limit, t)
     if sim.vehicle.guaranteed and rate_at_rest(wheel) < math.inf:
         asked, limit = guaranteed_rate(sim, i)[rows], rate_at_rest(wheel)
         yield use("SINGULAR_ZONE", wheel.id, asked, limit, t)
@@ -340,14 +343,13 @@ def can_wheel_follow(
     sim: Simulation, i: int, wheel: SteerableWheel, signs: tuple[int, ...]
 ) -> bool:
     """Whether a wheel does, with a number of turns for each piece within its range."""
-    rate = rate_at_rest(wheel)
     angles = [sim.steering(i, s, p) for s, p in zip(signs, sim.pieces, strict=True)]
     turned = windings(wheel, angles[0]) if angles else [0]
     for (one, before), (two, after) in itertools.pairwise(
         zip(sim.pieces, angles, strict=True)
     ):
-        reach = rate * (sim.t[two.first] - sim.t[one.last]) * (1 + 1e-6) + 1e-3
-        reach = max(reach, ALIGNMENT + 1e-3)
+        reach = turn_within(wheel, float(sim.t[two.first] - sim.t[one.last]))
+        reach = max(reach * (1 + 1e-6), ALIGNMENT) + 1e-3
         apart = float(after[0] - before[-1])
         if wheel.steering_range_deg is None:
             if abs(math.remainder(apart, 2 * math.pi)) > reach:
@@ -371,6 +373,16 @@ def windings(wheel: SteerableWheel, alpha: FloatArray) -> list[int]:
     first = math.ceil((low - ABSOLUTE - float(alpha.min())) / (2 * math.pi))
     last = math.floor((high + ABSOLUTE - float(alpha.max())) / (2 * math.pi))
     return list(range(first, last + 1))
+
+
+def turn_within(wheel: SteerableWheel, rest: float) -> float:
+    """Furthest turn from rest to rest in a time: the area below a trapezoid."""
+    rate = rate_at_rest(wheel)
+    if wheel.max_steering_acceleration_deg is None:
+        return rate * rest
+    gain = math.radians(wheel.max_steering_acceleration_deg)
+    peak = min(rate, gain * rest / 2)
+    return peak * (rest - peak / gain)
 
 
 def rate_at_rest(wheel: SteerableWheel) -> float:

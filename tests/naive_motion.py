@@ -33,6 +33,8 @@ SLIP_ANGLE = math.radians(1.0)
 SLIP_SPEED = 5e-3
 ALIGNMENT = math.radians(1.0)
 MOMENT = 1e-6  # s, over which changes are seen
+EPS = float(np.finfo(np.float64).eps)
+SWING = 1e-4  # s, likewise for changes of changes, at most
 
 
 # --- motions
@@ -144,10 +146,24 @@ class Piece:
         return slice(self.first, self.last + 1)
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """Twists one and two steps after every sample."""
+
+    step: FloatArray
+    """(n,) s."""
+    one: FloatArray
+    """(n, 3)."""
+    two: FloatArray
+    goes_on: BoolArray
+    """(n,) whether the vehicle moves on until then."""
+
+
 class Simulation:
     """One motion of one vehicle, sampled; with every sample the twist a moment later.
 
-    Without these (``later``) the rates of change are not known.
+    Without these (``later``) the rates of change are not known, without those `ahead`
+    how they change.
     """
 
     def __init__(
@@ -157,11 +173,12 @@ class Simulation:
         twists: FloatArray,
         later: FloatArray | None = None,
         moment: FloatArray | None = None,
+        ahead: Ahead | None = None,
         *,
         has_accelerations: bool = True,
     ) -> None:
         self.vehicle, self.t = vehicle, t
-        self.twists, self.later = twists, later
+        self.twists, self.later, self.ahead = twists, later, ahead
         self.moment = np.full(t.shape, MOMENT) if moment is None else moment
         self.has_accelerations = has_accelerations and later is not None
         self.vx, self.vy, self.omega = twists.T
@@ -212,6 +229,25 @@ class Simulation:
         u, later = self.velocity(*self.places[i]), self.velocity_later(*self.places[i])
         return np.asarray(np.angle(later * u.conj()) / self.moment)
 
+    def swinging(self, i: int) -> FloatArray:
+        """Steering acceleration of wheel i: 0 where the vehicle soon stands.
+
+        Without what rounding may add; the difference of two mean rates over one step
+        is a value that the acceleration takes, even across its jumps.
+        """
+        ahead, place = self.ahead, self.places[i]
+        assert ahead is not None
+        u, one, two = (
+            point_velocity(twists, *place)
+            for twists in (self.twists, ahead.one, ahead.two)
+        )
+        first, second = np.angle(one * u.conj()), np.angle(two * one.conj())
+        with np.errstate(divide="ignore", invalid="ignore"):
+            blur = 16 * EPS * np.abs(u).max() / np.abs(u)
+            blur += 4 * EPS * np.abs(self.t) * np.abs(first) / ahead.step
+            swing = (np.abs(second - first) - blur) / ahead.step**2
+        return np.asarray(np.where(ahead.goes_on, np.maximum(swing, 0.0), 0.0))
+
     def contact_speed(self, i: int, offset: float, sign: int) -> FloatArray:
         """Rolling speed of the wheel `offset` left of steering axis i.
 
@@ -261,14 +297,19 @@ def simulate(
     per_interval: int = 60,
     *,
     has_accelerations: bool = True,
+    has_swing: bool = False,
 ) -> Simulation:
     """Sample a motion with knots `t` finely, most finely where directions swing.
 
-    Accelerations of a motion along Omni-Curve-Parameters are no one's promise.
+    Accelerations of a motion along Omni-Curve-Parameters are no one's promise, steering
+    accelerations (`has_swing`) are one of poses only.
     """
     when = np.union1d(instants(t, per_interval), t[1:] - 2 * MOMENT)
     when = np.union1d(when, near_rest(vehicle, when, twist_at))
     when = np.union1d(when, edges_of_rest(vehicle, when, twist_at))
+    if has_swing:
+        when = np.union1d(when, np.maximum(t[1:] - 2.001 * SWING, t[:-1]))
+        when = np.union1d(when, strongest_swings(vehicle, when, twist_at))
     when = np.minimum(when, t[-1] - MOMENT)
     when = when[np.concatenate([[True], np.diff(when) > 1e-10])]
     after = when + MOMENT
@@ -278,8 +319,45 @@ def simulate(
         twist_at(when),
         twist_at(after),
         after - when,
+        look_ahead(vehicle, when, twist_at) if has_swing else None,
         has_accelerations=has_accelerations,
     )
+
+
+def look_ahead(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> Ahead:
+    """Look so little ahead that the vehicle does not come to rest on the way."""
+    kappa_g = naive.kappa_g(vehicle)
+    now, soon = (
+        moving_vectors(vehicle, twist_at(at), kappa_g) for at in (when, when + MOMENT)
+    )
+    gain = np.linalg.norm(soon - now, axis=1) / MOMENT
+    reach = 0.05 * np.linalg.norm(now, axis=1) / np.maximum(gain, 1e-9)
+    first = when + np.clip(reach, MOMENT, SWING)
+    step = first - when
+    one, two = twist_at(first), twist_at(first + step)
+    goes_on = [v_s_of(vehicle, twists, kappa_g) > STANDSTILL for twists in (one, two)]
+    return Ahead(step, one, two, goes_on[0] & goes_on[1] & (reach > MOMENT))
+
+
+def strongest_swings(
+    vehicle: Vehicle, when: FloatArray, twist_at: TwistAt
+) -> FloatArray:
+    """Times at which wheels with such a limit accelerate their steering most."""
+    found: list[FloatArray] = [when[:0]]
+    for i, wheel in enumerate(vehicle.wheels):
+        if getattr(wheel, "max_steering_acceleration_deg", None) is None:
+            continue
+
+        def calm(at: FloatArray, i: int = i) -> FloatArray:
+            ahead = look_ahead(vehicle, at, twist_at)
+            return -Simulation(vehicle, at, twist_at(at), ahead=ahead).swinging(i)
+
+        size = -calm(when)
+        peak = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])
+        at = np.flatnonzero(peak & (size[1:-1] > 0.3 * size.max())) + 1
+        if at.size:
+            found.append(least(calm, when[at - 1], when[at + 1]))
+    return np.concatenate(found)
 
 
 def near_rest(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> FloatArray:
@@ -326,6 +404,12 @@ def near_rest(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> FloatArr
     return np.concatenate(found)
 
 
+def v_s_of(vehicle: Vehicle, twists: FloatArray, kappa_g: float) -> FloatArray:
+    """|v_s|, m/s."""
+    x, y, q = moving_vectors(vehicle, twists, kappa_g).T
+    return np.asarray(np.maximum(np.hypot(x, y), np.abs(q)))
+
+
 def moving_vectors(vehicle: Vehicle, twists: FloatArray, kappa_g: float) -> FloatArray:
     """K's velocity and ω / κ_g, (n, 3)."""
     v = point_velocity(twists, *naive.reference(vehicle))
@@ -348,8 +432,7 @@ def edges_of_rest(vehicle: Vehicle, when: FloatArray, twist_at: TwistAt) -> Floa
     kappa_g = naive.kappa_g(vehicle)
 
     def moves(at: FloatArray) -> BoolArray:
-        x, y, q = moving_vectors(vehicle, twist_at(at), kappa_g).T
-        v_s = np.maximum(np.hypot(x, y), np.abs(q))
+        v_s = v_s_of(vehicle, twist_at(at), kappa_g)
         return np.asarray(v_s > STANDSTILL * (1 + 1e-6))
 
     now = moves(when)

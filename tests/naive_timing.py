@@ -67,10 +67,7 @@ class NaiveLimits:
                 size = self._size(w)(u)
                 for d in wheel.offsets:
                     rolls = size - self._sigma * (turn + alpha) * d
-                    load = (rolls / wheel.max_speed) ** 2
-                    found.append((("WHEEL_SPEED", i), load))
-                if wheel.steering_coupling:
-                    both = size + wheel.steering_coupling * abs(alpha)
+                    both = abs(rolls) + wheel.steering_coupling * abs(alpha)
                     found.append((("WHEEL_SPEED", i), (both / wheel.max_speed) ** 2))
             elif not isinstance(wheel, Castor) and wheel.max_speed is not None:
                 rolls = self._rolling(i)(u)

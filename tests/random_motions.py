@@ -203,4 +203,5 @@ def simulated(
         motion_of(trajectory),
         per_interval,
         has_accelerations=trajectory.form != "omni_curve",
+        has_swing=trajectory.form == "poses",
     )

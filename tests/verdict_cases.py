@@ -95,6 +95,9 @@ def with_rates(rng: np.random.Generator, vehicle: Vehicle) -> Vehicle:
     for wheel in data["wheels"]:
         if wheel["type"] in {"steered", "turntable"} and rng.random() < 0.6:
             wheel["max_steering_rate_deg"] = float(rng.uniform(30, 400))
+        if wheel["type"] in {"steered", "turntable"} and rng.random() < 0.3:
+            swing = float(10 ** rng.uniform(1.5, 3.5))
+            wheel["max_steering_acceleration_deg"] = swing
         if wheel["type"] != "castor" and rng.random() < 0.5:
             wheel["max_acceleration"] = float(rng.uniform(0.3, 3))
     for name, low, high in (

@@ -23,7 +23,15 @@ import configspace
 from configspace import Grid, PermissibleSpace, Vehicle
 from configspace.testing import VEHICLE_KINDS, random_vehicle, rigid_body
 from configspace.vehicle import SteeredWheel
-from omniplan import InvalidTrajectory, Report, Trajectory, Violation, validate
+from omniplan import (
+    InvalidTrajectory,
+    Report,
+    Tolerances,
+    Trajectory,
+    Violation,
+    validate,
+)
+from omniplan.validation import judged
 
 FloatArray = npt.NDArray[np.float64]
 GRID = Grid(100, 180)
@@ -134,11 +142,14 @@ def pieces(seed: int, vehicles: int, each: int) -> Iterator[Piece]:
 
 
 def assert_pieces_are_sound(seed: int, vehicles: int, each: int) -> None:
+    """Judge pieces without advice, which costs as much again as the verdict."""
     permitted = clear = by_vehicle = by_sheet = 0
     for piece in pieces(seed, vehicles, each):
         trajectory = piece.trajectory
-        known = validate(trajectory, piece.space).valid
-        published = validate(trajectory, piece.sheet).valid
+        known, published = (
+            judged(trajectory, space, Tolerances(), False).valid
+            for space in (piece.space, piece.sheet)
+        )
         is_permitted, is_clear = piece.permits()
         where = (piece.vehicle.wheels, piece.kappa_n, piece.beta, piece.v_n)
         assert is_permitted or not known, where
@@ -158,15 +169,16 @@ def assert_pieces_are_sound(seed: int, vehicles: int, each: int) -> None:
     assert by_sheet > 0.9 * clear
 
 
-@pytest.mark.parametrize("seed", range(1, 11))  # ten thousand pieces in all
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_valid_pieces_are_permitted_all_along(seed: int) -> None:
-    assert_pieces_are_sound(seed, vehicles=50, each=20)
+    assert_pieces_are_sound(seed, vehicles=20, each=20)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_ten_thousand_more_valid_pieces_are_permitted_all_along() -> None:
-    assert_pieces_are_sound(11, vehicles=500, each=20)
+@pytest.mark.parametrize("seed", range(4, 14))  # twenty thousand pieces in all
+def test_many_more_valid_pieces_are_permitted_all_along(seed: int) -> None:
+    assert_pieces_are_sound(seed, vehicles=100, each=20)
 
 
 def test_twists_are_refused_beyond_v_max_and_taken_just_below() -> None:
@@ -211,7 +223,13 @@ class Case:
     @cached_property
     def simulation(self) -> naive_motion.Simulation:
         t = self.trajectory.t
-        return naive_motion.simulate(self.vehicle, t, self.twist_at, self.per_interval)
+        return naive_motion.simulate(
+            self.vehicle,
+            t,
+            self.twist_at,
+            self.per_interval,
+            has_swing=self.trajectory.form == "poses",
+        )
 
 
 def random_twists(
@@ -323,6 +341,9 @@ def assert_is_taken(case: Case, violation: Violation) -> None:
     assert violation.t_start <= violation.t <= violation.t_end
     t = case.trajectory.t
     assert t[violation.index] <= violation.t + 1e-9
+    if violation.limit == "STEER_ACCELERATION":
+        assert_swings_so(case, violation)
+        return
     h = 1e-6
     values = []
     for first in (violation.t - h, violation.t):
@@ -333,6 +354,26 @@ def assert_is_taken(case: Case, violation: Violation) -> None:
         values.append(value_of(here, violation))
     assert any(
         np.isclose(value, violation.value, rtol=2e-3, atol=2e-4) for value in values
+    ), (violation, values)
+
+
+def assert_swings_so(case: Case, violation: Violation) -> None:
+    """The value is that of differences before or after the time named.
+
+    Second ones of third order, as an acceleration may jump there.
+    """
+    (wheel,) = (w for w in case.vehicle.wheels if w.id == violation.wheel)
+    assert violation.value is not None
+    values = []
+    for h in (3e-5, -3e-5):
+        when: FloatArray = violation.t + h * np.arange(5.0)
+        if when.min() < case.trajectory.t[0] or when.max() > case.trajectory.t[-1]:
+            continue
+        u = naive_motion.point_velocity(case.twist_at(when), wheel.x, wheel.y)
+        alpha = np.unwrap(np.angle(u))
+        values.append(abs(float(alpha @ [35, -104, 114, -56, 11])) / 12 / h**2)
+    assert any(
+        np.isclose(value, violation.value, rtol=2e-3, atol=1e-2) for value in values
     ), (violation, values)
 
 

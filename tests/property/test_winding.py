@@ -5,10 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
+import naive_limits
 import numpy as np
 import numpy.typing as npt
 import pytest
+import random_motions
 
 import configspace
 from configspace import Grid, PermissibleSpace, Vehicle, vehicle_from_data
@@ -272,3 +275,67 @@ def test_a_motion_with_stops_and_both_representations_is_never_wrongly_valid(
                 for flip in (0.0, math.pi)
             )
     assert valid > count / 10
+
+
+@pytest.mark.parametrize("swing_deg", [None, 50.0])
+@pytest.mark.parametrize("rate_deg", [None, 4000.0, 20.0])
+@pytest.mark.parametrize(
+    ("wheel", "rolled"),
+    [
+        ({"offset": 0.4}, 0.4),
+        ({"offset": -0.4}, 0.4),
+        ({"steering_coupling": 0.3}, 0.3),
+        ({"offset": -0.3, "steering_coupling": 0.2}, 0.5),
+        ({"type": "turntable", "track": 0.8}, 0.4),
+    ],
+)
+def test_unwinding_takes_the_time_that_rolling_beside_the_axis_asks(
+    wheel: dict[str, Any],
+    rolled: float,
+    rate_deg: float | None,
+    swing_deg: float | None,
+) -> None:
+    speed = 0.5
+    axis = {
+        "id": "w", "type": "steered", "x": 0.0, "y": 0.0, "max_speed": speed,
+        "steering_range_deg": (-70.0, 370.0), "max_steering_rate_deg": rate_deg,
+        "max_steering_acceleration_deg": swing_deg,
+    }  # fmt: skip
+    data = {
+        "name": "one",
+        "kappa_g": 2.0,
+        "wheels": [{**axis, **wheel}],
+        "limits": {"max_reverse_speed": 1e-2, "max_yaw_rate_deg": 90.0},
+    }
+    vehicle = vehicle_from_data(data)
+    space = configspace.build_space(vehicle, Grid(20, 36), cache=False)
+    rates = [speed / rolled] + ([math.radians(rate_deg)] if rate_deg else [])
+    needed = TURN / min(rates)
+    if swing_deg:  # gaining and losing the rate, well within a turn
+        needed += min(rates) / math.radians(swing_deg)
+    for rest in (0.95 * needed, 1.02 * needed):
+        trajectory = twice_round_by_300_degrees(rest)
+        report = validate(trajectory, space)
+        enough = rest > needed
+        assert report.valid == enough
+        broken = naive_limits.breaches(random_motions.simulated(vehicle, trajectory))
+        assert (broken == []) == enough
+        if not enough:
+            (violation,) = report.violations
+            assert violation.limit == "RECONFIGURATION"
+            assert violation.value == pytest.approx(needed, rel=1e-6)
+
+
+def twice_round_by_300_degrees(rest: float) -> Trajectory:
+    """From 0° to 300°, a rest, from there by as much again: the wheel must go back."""
+    steps = 61
+    direction = np.exp(1j * np.radians(np.linspace(0, 300, steps)))
+    direction = np.concatenate([direction, direction * direction[-1]])
+    v = np.concatenate(
+        [[0], 0.2 * direction[:steps], [0], [0], 0.2 * direction[steps:], [0]]
+    )
+    t = 2.0 * np.arange(steps + 2)
+    return Trajectory.from_twists(
+        np.concatenate([t, t + t[-1] + rest]),
+        np.stack([v.real, v.imag, 0 * v.real], -1),
+    )

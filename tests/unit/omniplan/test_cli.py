@@ -96,7 +96,8 @@ def test_select_ranks_and_refuses(capsys: Capture) -> None:
     out = capsys.readouterr().out
     assert "│ 1. │ mecanum │" in out
     assert "no ift-four-steered: wheel" in out
-    assert "advice: stand still for 0.50 s at t = 3.00 s" in out
+    # 90° at 180°/s and 720°/s², from rest to rest: 0.5 s + 0.25 s.
+    assert "advice: stand still for 0.75 s at t = 3.00 s" in out
 
 
 def test_select_says_what_is_unfit(capsys: Capture) -> None:
@@ -200,7 +201,9 @@ def test_demo_judges_over_zenoh_and_draws(tmp_path: Path, capsys: Capture) -> No
 
 
 @pytest.mark.service
-def test_serve_answers_queries_until_it_is_stopped(capsys: Capture) -> None:
+def test_serve_answers_queries_until_it_is_stopped(
+    tmp_path: Path, capsys: Capture
+) -> None:
     command = [sys.executable, "-m", "omniplan.cli", "serve", "--json"]
     command += ["--fleet", "mecanum", "--listen", "tcp/127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
@@ -220,6 +223,40 @@ def test_serve_answers_queries_until_it_is_stopped(capsys: Capture) -> None:
             assert cli.main(query) == 0
             assert cli.main(["query", "select", turn, *to_it]) == 0
             assert "│ mecanum │" in capsys.readouterr().out
+            file = str(tmp_path / "verdicts.parquet")
+            many = ["query", "many", turn, "--output", file, "--json", *to_it]
+            assert run_json(capsys, *many) == {"output": file, "pairs": 1, "valid": 1}
         finally:
             server.terminate()
         assert server.wait(timeout=20) == 0
+
+
+def test_mistakes_in_a_servers_configuration_are_bad_input(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "server.toml"
+    file.write_text("[queue]\nlength = 3")
+    monkeypatch.setenv("OMNIPLAN_WORKERS", "0")
+    monkeypatch.setenv("OMNIPLAN_CONFIG", str(file))
+    assert cli.main(["serve", "--site", "a/b"]) == 2
+    message = capsys.readouterr().err
+    assert "queue.length: unknown key; allowed are size, bytes" in message
+    assert "OMNIPLAN_WORKERS: 0; " in message
+    assert "--site: 'a/b'; " in message
+
+
+def test_the_schema_of_every_message_is_published(capsys: Capture) -> None:
+    names = run_json(capsys, "schema", "messages", "--json")
+    assert "BatchValidateRequest" in names
+    for name in names:
+        schema = run_json(capsys, "schema", name)
+        assert isinstance(schema, dict)
+        assert schema["title"] == name
+    assert cli.main(["schema", "nothing"]) == 2
+    assert "ValidateRequest" in capsys.readouterr().err
+
+
+def test_the_schema_of_a_servers_configuration_is_published(capsys: Capture) -> None:
+    assert cli.main(["schema", "service"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert "queue" in schema["properties"]

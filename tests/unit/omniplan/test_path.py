@@ -109,5 +109,3 @@ def test_a_path_cannot_be_judged_without_times() -> None:
     path = Path.from_poses(LINE, name="aisle")
     with pytest.raises(InvalidTrajectory, match=r"aisle: a path.*fastest"):
         omniplan.validate(path, space)
-    with pytest.raises(InvalidTrajectory, match=r"aisle: a path.*fastest"):
-        omniplan.select(path, [space])

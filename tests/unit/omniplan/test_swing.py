@@ -12,6 +12,7 @@ from configspace import Grid, vehicle_from_data
 from configspace.testing import random_vehicle
 from omniplan import Tolerances, Trajectory, validate
 from omniplan.motion import Intervals, OmniCurveMotion, PoseMotion, motion_of
+from omniplan.swing import Swing
 from omniplan.vehicle_judge import VehicleJudge
 
 FloatArray = npt.NDArray[np.float64]
@@ -102,6 +103,24 @@ def test_a_stop_to_stop_interval_is_factored_at_both_ends() -> None:
     ends, bound = swing.directions.accelerations(0.3j)
     assert np.abs(ends).max() < 1e-12
     assert bound.max() < 1e-9
+
+
+def test_an_instant_at_which_a_wheel_stands_has_no_bound() -> None:
+    # The vehicle starts to move ahead while it turns about its origin.
+    instant = Swing(
+        dt=np.zeros(1),
+        h=np.zeros((2, 1)),
+        speed=np.array([[0.0], [1.0], [0.0]], dtype=np.complex128),
+        turn=np.array([[0.0], [0.0], [1.0]]),
+        heading=np.array([[0.0], [0.0], [1.0], [0.0]]),
+        point=0j,
+    ).directions
+    for values in (instant.accelerations, instant.rates):
+        ends, bound = values(0j)
+        assert (ends == 0).all()
+        assert bound[0] == math.inf
+        _, bound = values(0.5j)
+        assert np.isfinite(bound).all()
 
 
 def test_a_sinusoidal_side_slip_has_the_acceleration_of_a_sine() -> None:

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from timing_cases import demanding_vehicle, smooth_path
 
 import configspace
 from configspace import InvalidInput, PermissibleSpace, vehicle_from_data
+from configspace.testing import VehicleKind
 from omniplan import (
     InvalidTrajectory,
     NotDrivable,
@@ -296,3 +298,24 @@ def test_profiles_tell_the_limit_and_its_wheel(space_of: SpaceOf) -> None:
     }
     assert (np.diff(profile.t) > 0).all()
     assert not profile.u.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("seed", "kind", "loss"),
+    [
+        (2, "loaded", 5e-3),  # motors shared by driving and steering, beside the axis
+        (22, "turntable", 5e-3),
+        (11, "offset", 3e-2),  # limits on the steering acceleration
+    ],
+)
+def test_trajectories_are_hardly_slower_than_the_optimum(
+    seed: int, kind: VehicleKind, loss: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    vehicle = demanding_vehicle(rng, kind)
+    space = configspace.build_space(vehicle, configspace.Grid(40, 72), cache=False)
+    timing = time_path(smooth_path(rng), space)
+    assert timing.trajectory is not None, timing.message
+    assert timing.profile is not None
+    assert validate(timing.trajectory, space).valid
+    assert timing.trajectory.duration < timing.profile.duration * (1 + loss)

@@ -10,7 +10,7 @@ import pytest
 
 from configspace import Grid, PermissibleSpace, build_space, vehicle_from_data
 from omniplan import Path, Trajectory, fastest, time_path
-from omniplan.motion import motion_of
+from omniplan.motion import PoseMotion, motion_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,7 +50,8 @@ def seen(trajectory: Trajectory, points: list[Any]) -> tuple[FloatArray, FloatAr
     """Speeds of points of the body, (n, points), and |ω|, from dense differences."""
     t = np.linspace(0, trajectory.duration, 40001)
     motion = motion_of(trajectory, is_own=False)
-    poses = motion.poses_at(t)  # type: ignore[union-attr]
+    assert isinstance(motion, PoseMotion)
+    poses = motion.poses_at(t)
     arm = np.array([complex(*p) - complex(*REFERENCE) for p in points])
     place = (poses[:, 0] + 1j * poses[:, 1])[:, None] + np.exp(1j * poses[:, 2])[
         :, None
