@@ -23,6 +23,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from configspace import InvalidInput, PermissibleSpace, Problem
+from omniplan.batch_coarse import groups_of
 from omniplan.batch_fleet import Fleet, fleet_of, is_plain
 from omniplan.batch_motions import Motions, motions_of
 from omniplan.batch_twists import check_twists
@@ -251,6 +252,7 @@ class Batch:
             motions.count,
             motions.knots,
             motions.is_pose,
+            *groups_of(motions),
         )
         known = (fleet.bodies, fleet.rows, fleet.order, fleet.first)
         edges = np.linspace(0, shape[0], min(SLICES, shape[0]) + 1).astype(int)

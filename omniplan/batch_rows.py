@@ -53,7 +53,7 @@ from omniplan.batch_chords import (
 )
 from omniplan.batch_motions import LANES
 
-__all__ = ["evaluate"]
+__all__ = ["arc_cosine", "evaluate"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
@@ -107,7 +107,7 @@ def _singular(s: Array) -> None:
 
 
 @njit(cache=True)
-def _arc_cosine(c: float) -> float:
+def arc_cosine(c: float) -> float:
     """Return the arc cosine to 3e-8 rad (Abramowitz and Stegun 4.4.46)."""
     size = abs(c)
     size = size if size < 1.0 else 1.0
@@ -133,15 +133,15 @@ def _range(s: Array, sign: float, cos: float, sin: float, half: float) -> None:
         na, nb = s[NA + k], s[NB + k]
         ca, sa = sign * (ax * cos + ay * sin), sign * (ay * cos - ax * sin)
         cb, sb = sign * (bx * cos + by * sin), sign * (by * cos - bx * sin)
-        a = _arc_cosine(ca / (na if na > 0.0 else 1.0))
-        b = _arc_cosine(cb / (nb if nb > 0.0 else 1.0))
+        a = arc_cosine(ca / (na if na > 0.0 else 1.0))
+        b = arc_cosine(cb / (nb if nb > 0.0 else 1.0))
         rolls0 = (s[MOVES0 + k] > 0.0) & (na > 1e-9 * s[MOVES0 + k])
         rolls1 = (s[MOVES1 + k] > 0.0) & (nb > 1e-9 * s[MOVES1 + k])
         low0, low1 = (a if rolls0 else 0.0), (b if rolls1 else 0.0)
         near, radius = s[NEAR + k], s[RADIUS + k]
         reach = near + radius
         share = radius / (reach if reach > 0.0 else 1.0)
-        spread = 1.5707963267948966 - _arc_cosine(share)
+        spread = 1.5707963267948966 - arc_cosine(share)
         # Behind: the sines differ and the segment crosses the axis left of zero.
         crossing = (ca * sb - cb * sa) * (sb - sa)
         behind = (sa * sb <= 0.0) & (crossing <= 0.0) & ((ca < 0.0) | (cb < 0.0))
@@ -394,7 +394,7 @@ def _keep(s: Array, highs: Array, at: int) -> None:
 @njit(cache=True)
 def evaluate(
     s: Array, rows: Array, first: int, last: int, vehicle: Array, tolerances: Array,
-    exact: int, most: Array, highs: Array, block: int, blocks: int,
+    exact: int, wanted: Array, most: Array, highs: Array, block: int, blocks: int,
 ) -> None:  # fmt: skip
     """Write what rows first to last - 1 say of a block to its fields `LOW` and `HIGH`.
 
@@ -412,6 +412,8 @@ def evaluate(
         Standstill in m/s, sine of the slip angle, slip speed in m/s.
     exact : {0, 1}
         Whether angles are needed to the last digit.
+    wanted : (r,) float
+        Rows with a 0 are left out, unless `blocks` is 0.
     most : (r * 2 LANES,) float
         Gets the largest `LOW` and `HIGH` so far of every row, lane by lane.
     highs : (r * blocks * LANES,) float
@@ -423,6 +425,8 @@ def evaluate(
     at_x, at_y = vehicle[0], vehicle[1]
     has_ends, has_chord, has_change, has_reach = True, True, False, False
     for r in range(first, last):
+        if blocks > 0 and wanted[r] == 0.0:
+            continue
         x, y = rows[r, AT], rows[r, AT + 1]
         if x != at_x or y != at_y:
             at_x, at_y = x, y

@@ -18,7 +18,7 @@ from numba import njit
 from omniplan.batch_chords import LOW, NA, ROOM
 from omniplan.batch_motions import FIELDS, LANES, enclose
 from omniplan.batch_pieces import MAX_PIECES, angle_of, choose, pieces_of
-from omniplan.batch_refine import KEPT, NO, STACK, YES, one_row, refine, sweep
+from omniplan.batch_refine import HALVES, KEPT, NO, STACK, YES, one_row, refine, sweep
 from omniplan.batch_rows import (
     ANGLE,
     BOUND,
@@ -85,8 +85,8 @@ def _describe(
 @njit(cache=True, inline="always")
 def _settled(
     blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array,
-    stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
+    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
+    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
     pieces: int, by_piece: Array,
 ) -> bool:  # fmt: skip
     """Decide every row that holds for both representations, and each by pieces.
@@ -103,11 +103,11 @@ def _settled(
         if rows[r, SIGN] != 0 or high[r] <= KEPT:
             continue
         # A broken pair is refused whatever else is open.
-        if broken and low[r] <= KEPT:
+        if broken:
             continue
         low[r], high[r], is_clear = refine(
             blocks, knot_of, count, knots, is_pose, rows, r, vehicle, tolerances,
-            s, highs, stack, knot_at, NO, count, KEPT, PROVING, NO, place[r],
+            s, highs, skipped, halves, stack, knot_at, NO, count, KEPT, PROVING, NO, place[r],
         )  # fmt: skip
         if low[r] > KEPT:
             broken = True
@@ -126,7 +126,7 @@ def _settled(
             else:
                 reached, most, is_clear = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, stack, knot_at, ends[p, 0], ends[p, 1], KEPT,
+                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0], ends[p, 1], KEPT,
                     PROVING, YES, place[r],
                 )  # fmt: skip
             if not is_clear and not broken:
@@ -140,15 +140,18 @@ def _settled(
 
 @njit(cache=True, inline="always")
 def _judge(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, order: Array, vehicle: Array, tolerances: Array,
+    blocks: Array, groups: Array, knot_of: Array, count: int, knots: Array,
+    is_pose: bool, rows: Array, order: Array, vehicle: Array, tolerances: Array,
     room: tuple[Array, ...], out: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Return the verdict on one pair, and the row that tells it.
 
     `out` gets the margin, then time, value and bound of the row that refuses.
     """
-    s, most, highs, low, high, place, stack, knot_at, ends, by_piece, signs = room
+    (
+        s, tops, wanted, done, most, highs, skipped, halves, low, high, at, place, stack,
+        knot_at, ends, by_piece, signs,
+    ) = room  # fmt: skip
     n_rows = rows.shape[0]
     pieces = 1
     ends[0, 0], ends[0, 1], signs[0] = 0, count, 0
@@ -156,11 +159,14 @@ def _judge(
         pieces = pieces_of(blocks, count, vehicle, tolerances, s, ends)
         if pieces < 0:
             return UNCLEAR, -1
-    sweep(blocks, rows, vehicle, tolerances, s, most, highs, low, high)
+    sweep(
+        blocks, groups, rows, vehicle, tolerances, s, tops, wanted, done, most, highs,
+        skipped, low, high, at,
+    )  # fmt: skip
     place[:n_rows, 0] = -1.0
     if not _settled(
         blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s,
-        highs, stack, knot_at, low, high, place, ends, pieces, by_piece,
+        highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces, by_piece,
     ):  # fmt: skip
         return UNCLEAR, -1
     if vehicle[3] > 0 and not choose(
@@ -177,12 +183,12 @@ def _judge(
     if is_valid:
         which = _margin(
             blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s,
-            highs, stack, knot_at, low, high, place, ends, pieces, signs, out,
+            highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces, signs, out,
         )  # fmt: skip
         return VALID, which
     verdict: tuple[int, int] = _refusal(
         blocks, knot_of, count, knots, is_pose, rows, order, vehicle, tolerances, s,
-        highs, stack, knot_at, low, place, ends, pieces, signs, out,
+        highs, skipped, halves, stack, knot_at, low, at, place, ends, pieces, signs, out,
     )  # fmt: skip
     return verdict
 
@@ -196,8 +202,8 @@ def _is_driven(sign: float, pieces: int, signs: Array, steers: bool, p: int) -> 
 @njit(cache=True, inline="always")
 def _margin(
     blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array,
-    stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
+    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
+    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
     pieces: int, signs: Array, out: Array,
 ) -> int:  # fmt: skip
     """Write the margin of a valid pair, sharpened; return the row it belongs to."""
@@ -218,7 +224,7 @@ def _margin(
                 first, last = (NO, count) if sign == 0 else (ends[p, 0], ends[p, 1])
                 reached, most, _ = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, stack, knot_at, first, last, limit,
+                    tolerances, s, highs, skipped, halves, stack, knot_at, first, last, limit,
                     SHARPENING, NO, place[r],
                 )  # fmt: skip
                 worst = max(worst, reached)
@@ -232,8 +238,8 @@ def _margin(
 def _refusal(
     blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
     rows: Array, order: Array, vehicle: Array, tolerances: Array, s: Array,
-    highs: Array, stack: Array, knot_at: Array, low: Array, place: Array, ends: Array,
-    pieces: int, signs: Array, out: Array,
+    highs: Array, skipped: Array, halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, at: Array, place: Array,
+    ends: Array, pieces: int, signs: Array, out: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Write what refuses a pair and the margin; return the verdict and the row."""
     steers = vehicle[3] > 0
@@ -245,10 +251,10 @@ def _refusal(
             if sign != 0 and not _is_driven(sign, pieces, signs, steers, p):
                 continue
             reached = low[r]
-            if sign != 0 and pieces > 1:
+            if sign != 0 and (pieces > 1 or low[r] > KEPT):
                 reached, _, _ = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, stack, knot_at, ends[p, 0], ends[p, 1],
+                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0], ends[p, 1],
                     np.inf, NO, YES, place[r],
                 )  # fmt: skip
             worst = max(worst, reached)
@@ -264,7 +270,8 @@ def _refusal(
     if there[0] < 0:
         refine(
             blocks, knot_of, count, knots, is_pose, rows, which, vehicle, tolerances, s,
-            highs, stack, knot_at, NO, count, np.inf, NO, YES, there,
+            highs, skipped, halves, stack, knot_at, at[which] * LANES,
+            min(count, (at[which] + 1) * LANES), np.inf, NO, YES, there,
         )  # fmt: skip
     out[0] = max(1 - worst, -1e6)
     _describe(
@@ -286,7 +293,8 @@ def judge_pairs(
 
     Parameters
     ----------
-    motions : blocks, knot_of, first, count, knots, is_pose of `Motions`
+    motions
+        Blocks, knot_of, first, count, knots, is_pose of `Motions`; `groups_of` them.
     start, stop : int
     fleet : bodies, rows, order, first of `Fleet`
     tolerances : (4,) float
@@ -299,21 +307,28 @@ def judge_pairs(
     numbers : (m, n, 4) float
         Margin; of a refused pair also time in s, value and bound.
     """
-    blocks, knot_of, first, count, knots, is_pose = motions
+    blocks, knot_of, first, count, knots, is_pose, groups, first_group = motions
     bodies, rows, order, first_row = fleet
     most = 1
     for v in range(bodies.shape[0]):
         most = max(most, first_row[v + 1] - first_row[v])
     for n in range(start, stop):
         wide = LANES * (first[n + 1] - first[n])
+        of_motion = groups[first_group[n] : first_group[n + 1]]
         room = (
             np.zeros(ROOM),
+            np.empty(LANES * most * of_motion.shape[0]),
+            np.empty(most),
+            np.empty(most),
             np.empty(2 * LANES * most),
             np.empty(wide * most),
+            np.empty(wide // LANES * most),
+            (np.empty((HALVES * wide, FIELDS)), np.zeros(HALVES * wide, np.bool_)),
             np.empty(most),
             np.empty(most),
+            np.empty(most, np.int64),
             np.empty((most, 3)),
-            np.empty((STACK, 3)),
+            np.empty((STACK, 4)),
             np.empty(STACK, np.int64),
             np.empty((MAX_PIECES, 2), np.int64),
             np.empty((MAX_PIECES, 2, 3)),
@@ -322,8 +337,8 @@ def judge_pairs(
         for v in range(bodies.shape[0]):
             a, b = first_row[v], first_row[v + 1]
             status[n, v], which[n, v] = _judge(
-                blocks[first[n] : first[n + 1]], knot_of[first[n] : first[n + 1]],
-                count[n], knots, is_pose[n], rows[a:b], order[a:b], bodies[v],
+                blocks[first[n] : first[n + 1]], of_motion,
+                knot_of[first[n] : first[n + 1]], count[n], knots, is_pose[n], rows[a:b], order[a:b], bodies[v],
                 tolerances, room, numbers[n, v],
             )  # fmt: skip
             if which[n, v] >= 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from omniplan.chords import Chord, speed_of
 from omniplan.motion import Enclosure, Intervals, Motion
-from omniplan.rows import Judge, Tolerances
+from omniplan.rows import Judge, Row, Tolerances
 
-__all__ = ["Parts", "Piece", "Proof"]
+__all__ = ["Parts", "Piece", "Proof", "refused"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -80,6 +80,27 @@ class Parts:
             np.where(forward, self.low[1], self.low[-1]),
             np.where(forward, self.high[1], self.high[-1]),
         )
+
+
+def refused(low: FloatArray, high: FloatArray, rows: Sequence[Row]) -> BoolArray:
+    """Return which limits are broken, or may be on parts that surely break none.
+
+    Parameters
+    ----------
+    low, high : (m, rows) float
+        Utilisations of the parts, decided.
+    rows : sequence of Row
+
+    Returns
+    -------
+    refused : (m, rows) bool
+    """
+    broken = low > 1 + ROUNDING
+    # Where one limit is surely broken the others were not pursued to the end.
+    open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1, keepdims=True)
+    # With the centre of rotation on a wheel nothing more can be said of the wheel.
+    open_ &= np.isfinite(high) | np.array([row.bound == 0 for row in rows], dtype=bool)
+    return np.asarray(broken | open_, dtype=bool)
 
 
 class Proof:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from configspace import PermissibleSpace
 from configspace.omni_curve import curvature_of_ratio
 from omniplan.motion import Intervals
-from omniplan.proof import ROUNDING, Parts, Piece, Proof
+from omniplan.proof import Parts, Piece, Proof, refused
 from omniplan.reach import is_apart
 from omniplan.rows import Judge, Tolerances
 from omniplan.ways import Change, Changer, Configuration, Way
@@ -159,7 +159,7 @@ def choose_configurations(
         return Choice(
             (1,), (), (), _apart(parts, pieces, [1] * len(pieces), judge, lost)
         )
-    options = _options(proof, pieces, lost, sweeps_of(parts, pieces, wheels))
+    options = _options(proof, judge, pieces, lost, sweeps_of(parts, pieces, wheels))
     changer = _Changes(parts, pieces, judge, Changer(judge, space, tolerances))
     best = _best(options, changer, judge)
     return Choice(
@@ -172,6 +172,7 @@ def choose_configurations(
 
 def _options(
     proof: Proof,
+    judge: Judge,
     pieces: Sequence[Piece],
     lost: dict[tuple[int, int], bool],
     sweeps: Sequence[tuple[Sweep, ...]],
@@ -181,13 +182,13 @@ def _options(
     Only the best of a piece can be part of the best sequence that is valid, and looking
     for ways between configurations is dear.
     """
-    options = []
+    parts, options = proof.parts, []
+    faults = {s: refused(parts.low[s], parts.high[s], judge.rows) for s in proof.signs}
     for i, (piece, swept) in enumerate(zip(pieces, sweeps, strict=True)):
         rows = slice(piece.first, piece.last + 1)
         costs = {
             sign: float(
-                (proof.parts.high[sign][rows] > 1 + ROUNDING).any(axis=0).sum()
-                + lost[i, sign] * UNREACHABLE
+                faults[sign][rows].any(axis=0).sum() + lost[i, sign] * UNREACHABLE
             )
             for sign in proof.signs
         }

@@ -14,7 +14,7 @@ from configspace.angles import wrap
 from configspace.omni_curve import curvature_of_ratio
 from configspace.vehicle import SteerableWheel
 from omniplan.motion import Enclosure, Motion, PoseMotion
-from omniplan.proof import ROUNDING, Parts
+from omniplan.proof import ROUNDING, Parts, refused
 from omniplan.report import Violation
 from omniplan.rows import Judge, Row
 from omniplan.standstill import Choice
@@ -185,17 +185,12 @@ def find_violations(
     sign = choice.sign_of(parts.spans)
     low, high = parts.picked(sign)
     describer = _Describer(judge, trajectory, motion, space)
-    broken = np.asarray(low > 1 + ROUNDING, dtype=bool)
-    # Where one limit is surely broken the others were not pursued to the end.
-    open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1, keepdims=True)
-    # With the centre of rotation on a wheel nothing more can be said of the wheel.
-    open_ &= np.isfinite(high) | np.array([row.bound == 0 for row in judge.rows])
-    refused = np.asarray(broken | open_, dtype=bool)
-    if not refused.any():
+    faults = refused(low, high, judge.rows)
+    if not faults.any():
         return
     at_end = _worse_at_end(judge, parts, sign)
     for column, row in enumerate(judge.rows):
-        for run in _runs(refused[:, column]):
+        for run in _runs(faults[:, column]):
             reached = low[run, column]
             is_proved = bool((reached > 1 + ROUNDING).any())
             ranked = reached if is_proved else high[run, column]

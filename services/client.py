@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
+import copy
 import math
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
 
 from configspace.errors import CacheError, InvalidInput, Problem
 from configspace.space import PermissibleSpace
 from configspace.storage import parse_space
 from configspace.vehicle import Vehicle
 from configspace.vehicle_io import parse_vehicle
+from omniplan.batch import SCHEMA, require_names
 from omniplan.report import Ranking, Report
-from omniplan.trajectory import Trajectory
+from omniplan.requirements import Requirement
+from omniplan.trajectory import Trajectory, timed
+from services.arrow_motions import table_of_twists
+from services.asking import Asker
+from services.batch_client import Part, Progress, asked, questions_of, slices_of
+from services.batch_messages import BatchTwistsRequest, BatchValidateRequest
 from services.endpoint import DEFAULT_ENDPOINT, Endpoint
-from services.errors import (
-    InvalidMessage,
-    RemoteError,
-    ServiceError,
-    ServiceUnreachable,
-)
+from services.errors import ServiceError, ServiceUnreachable
 from services.keys import Keys, Route
 from services.messages import (
-    JSON,
-    ErrorReply,
     Health,
+    Question,
     SelectReply,
     SelectRequest,
     ValidateReply,
@@ -36,7 +41,14 @@ from services.messages import (
     decode,
     encode,
 )
-from services.session import Peer, Reply
+from services.registry_messages import (
+    RegisterReply,
+    RegisterRequest,
+    UnregisterRequest,
+)
+from services.security import Security, check_endpoint, zenoh_entries
+from services.session import Stop
+from services.sheet_cache import SheetCache
 
 __all__ = ["Client"]
 
@@ -54,35 +66,60 @@ class Client:
 
     Parameters
     ----------
-    endpoint : str
-        Where the server listens, ``tcp/HOST:PORT``.
+    endpoint : str or sequence of str
+        Where the server listens, ``tcp/HOST:PORT`` or ``tls/HOST:PORT``; of several
+        servers of the site any that is there answers.
     site : str
         The site the server answers for.
     timeout : float, s, > 0
-        For each question.
+        For each question, all attempts together; in a batch for each part of the
+        answer.
+    attempt_timeout : float, s, > 0, optional
+        After so long without an answer all servers are asked again, not only the
+        nearest; default `timeout`.
+    retry : bool
+        Ask again, within `timeout`, where the server is busy or about to stop, or has
+        gone after it was there. All questions may be repeated without harm.
+    security : Security, optional
+        Certificates, for ``tls/HOST:PORT``; see ``docs/security.md``.
 
     Raises
     ------
     InvalidInput
-        If a value is not allowed, InvalidEndpoint for the address.
+        If a value is not allowed: InvalidEndpoint for the address, InvalidSecurity for
+        a certificate.
     """
 
     def __init__(
         self,
-        endpoint: str = DEFAULT_ENDPOINT,
+        endpoint: str | Sequence[str] = DEFAULT_ENDPOINT,
         *,
         site: str = "default",
         timeout: float = 10.0,
+        attempt_timeout: float | None = None,
+        retry: bool = True,
+        security: Security | None = None,
     ) -> None:
-        self._endpoint = Endpoint.parse("endpoint", endpoint)
-        self._keys = Keys(site)
-        self._timeout = _checked_timeout(timeout)
-        self._lock = threading.Lock()
-        self._peer: Peer | None = None
-        self._is_closed = False
+        keys = Keys(site)
+        self._timeout = _checked_timeout("timeout", timeout)
+        if attempt_timeout is not None:
+            _checked_timeout("attempt_timeout", attempt_timeout)
+        self._asker = Asker(
+            _endpoints(endpoint, security),
+            keys,
+            zenoh_entries(security, "client", keys),
+            min(timeout, attempt_timeout or timeout),
+            retry=retry,
+        )
+        self._sheets = SheetCache(self._asker)
+        self._stop: Stop | None = None
 
     def validate(
-        self, trajectories: Sequence[Trajectory], vehicle: str
+        self,
+        trajectories: Sequence[Trajectory],
+        vehicle: str,
+        *,
+        allow_unreachable: bool = False,
     ) -> tuple[Report, ...]:
         """Ask whether a vehicle can drive trajectories.
 
@@ -91,14 +128,18 @@ class Client:
         trajectories : sequence of Trajectory
         vehicle : str
             One of `vehicles`.
+        allow_unreachable : bool
+            As for `omniplan.validate`.
 
         Returns
         -------
         reports : tuple of Report
             One for each trajectory, as `omniplan.validate` gives them.
         """
-        request = ValidateRequest.of(trajectories, vehicle)
-        payload = self._ask(Route("validate"), encode(request))
+        request = ValidateRequest.of(
+            trajectories, vehicle, allow_unreachable=allow_unreachable
+        )
+        payload = self._ask_question(Route("validate"), request)
         reports = _read(lambda: decode(ValidateReply, payload).values())
         return _one_each(reports, trajectories)
 
@@ -107,6 +148,10 @@ class Client:
         trajectories: Sequence[Trajectory],
         vehicles: Sequence[str] | None = None,
         by: str = "duration",
+        *,
+        requirements: Sequence[Requirement | str] = (),
+        allow_unreachable: bool = False,
+        online_only: bool = False,
     ) -> tuple[Ranking, ...]:
         """Ask which vehicles can drive trajectories, best first.
 
@@ -115,17 +160,125 @@ class Client:
         trajectories : sequence of Trajectory
         vehicles : sequence of str, optional
             Which to compare; default all that the server knows.
-        by : {"duration", "margin"}
+        by : {"duration", "margin", "manoeuvrability"}
+        requirements : sequence of Requirement or str
+        allow_unreachable : bool
+            Both as for `omniplan.select`.
+        online_only : bool
+            Compare only vehicles that are online now.
 
         Returns
         -------
         rankings : tuple of Ranking
             One for each trajectory, as `omniplan.select` gives them.
         """
-        request = SelectRequest.of(trajectories, vehicles, by)
-        payload = self._ask(Route("select"), encode(request))
+        request = SelectRequest.of(
+            trajectories,
+            vehicles,
+            by,
+            requirements,
+            allow_unreachable=allow_unreachable,
+            online_only=online_only,
+        )
+        payload = self._ask_question(Route("select"), request)
         rankings = _read(lambda: decode(SelectReply, payload).values())
         return _one_each(rankings, trajectories)
+
+    def validate_many(
+        self,
+        trajectories: Sequence[Trajectory],
+        vehicles: Sequence[str] | None = None,
+        *,
+        allow_unreachable: bool = False,
+        progress: Progress | None = None,
+        timeout: float | None = None,
+    ) -> pa.Table:
+        """Ask which of many trajectories which vehicles can drive.
+
+        Parameters
+        ----------
+        trajectories : sequence of Trajectory
+            Of any number; the client cuts the batch into requests. Names must differ.
+        vehicles : sequence of str, optional
+            Default all that the server knows.
+        allow_unreachable : bool
+            As for `omniplan.validate_many`.
+        progress : callable, optional
+            Is given the number of pairs that are done and of all, after every part.
+        timeout : float, s, > 0, optional
+            For the whole batch. In any case every part must come within the timeout of
+            the client.
+
+        Returns
+        -------
+        table : pyarrow.Table
+            One row per pair, as `omniplan.validate_many` gives them.
+
+        Raises
+        ------
+        InvalidInput
+            If there is no trajectory, names repeat, or a path has no times.
+        """
+        parts = self._verdicts(trajectories, vehicles, allow_unreachable, timeout)
+        found = list(_told(parts, progress))
+        table = pa.concat_tables([part.rows for part in found]).cast(SCHEMA)
+        counts = {
+            "omniplan.pairs": str(table.num_rows),
+            "omniplan.asked": str(sum(part.asked for part in found)),
+        }
+        return table.replace_schema_metadata(counts)
+
+    def verdicts(
+        self,
+        trajectories: Sequence[Trajectory],
+        vehicles: Sequence[str] | None = None,
+        *,
+        allow_unreachable: bool = False,
+        progress: Progress | None = None,
+        timeout: float | None = None,
+    ) -> Generator[pa.Table, None, None]:
+        """Ask as `validate_many`, and yield the rows in parts as they come.
+
+        Closing the generator cancels what the server has not done yet.
+        """
+        parts = self._verdicts(trajectories, vehicles, allow_unreachable, timeout)
+        for part in _told(parts, progress):
+            yield part.rows
+
+    def check_twists(
+        self,
+        twists: npt.ArrayLike,
+        vehicle: str,
+        *,
+        progress: Progress | None = None,
+        timeout: float | None = None,
+    ) -> npt.NDArray[np.bool_]:
+        """Ask which twists are permitted.
+
+        Parameters
+        ----------
+        twists : (n, 3) float32 or float64, m/s, m/s, rad/s
+            As for `omniplan.check_twists`.
+        vehicle : str
+        progress, timeout
+            As for `validate_many`.
+
+        Returns
+        -------
+        permitted : (n,) bool
+        """
+        table = table_of_twists(twists)
+        parts = asked(
+            self._asker,
+            Route("batch_twists"),
+            slices_of(table, BatchTwistsRequest(vehicle=vehicle)),
+            table.num_rows,
+            _checked_overall(timeout),
+            self._stop or Stop(),
+        )
+        found = [part.rows["permitted"] for part in _told(parts, progress)]
+        permitted = pa.chunked_array([x for column in found for x in column.chunks])
+        return np.asarray(permitted.to_numpy(), dtype=np.bool_)
 
     def vehicles(self) -> tuple[str, ...]:
         """Return the names of the vehicles that the server knows."""
@@ -138,14 +291,83 @@ class Client:
         return _read(lambda: parse_vehicle(payload.decode()))
 
     def space(self, name: str) -> PermissibleSpace:
-        """Return a vehicle's data sheet."""
-        payload = self._ask(Route("space", name))
-        return _read(lambda: parse_space(payload))
+        """Return a vehicle's data sheet, to check with it without asking again.
+
+        It is kept until a server publishes that the vehicle has changed, or cannot be
+        seen any longer; so this may be called before every check.
+        """
+        known = self._sheets.get(name)
+        if known is not None:
+            return known
+        route = Route("space", name)
+        self._asker.keys.of(route)  # refuses what is no name before connecting
+        mark = self._sheets.follow(self._asker.peer(self._timeout))
+        payload = self._ask(route)
+        space = _read(lambda: parse_space(payload))
+        self._sheets.put(name, space, mark)
+        return space
 
     def health(self) -> Health:
         """Return the state of the server."""
         payload = self._ask(Route("health"))
         return _read(lambda: decode(Health, payload))
+
+    def register(self, vehicle: Vehicle, expected_version: str | None = None) -> str:
+        """Register a vehicle, or a new version of it, with all servers of the site.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+        expected_version : str, optional
+            The version that it replaces, or ``"absent"``: if there is another one,
+            RemoteError with code ``conflict``.
+
+        Returns
+        -------
+        version : str
+            That which is there now; the same as before if the vehicle is.
+        """
+        text = vehicle.model_dump_json(exclude_none=True)
+        request = RegisterRequest(vehicle=text, expected_version=expected_version)
+        payload = self._ask(Route("register", vehicle.name), encode(request))
+        return _read(lambda: decode(RegisterReply, payload).version)
+
+    def unregister(self, name: str, expected_version: str | None = None) -> str:
+        """Remove a registered vehicle from all servers of the site.
+
+        Parameters
+        ----------
+        name : str
+        expected_version : str, optional
+            The version that is to be removed: if there is another one, RemoteError with
+            code ``conflict``.
+
+        Returns
+        -------
+        version : str
+            That of the removal.
+        """
+        request = UnregisterRequest(expected_version=expected_version)
+        payload = self._ask(Route("unregister", name), encode(request))
+        return _read(lambda: decode(RegisterReply, payload).version)
+
+    @contextmanager
+    def announce(self, vehicle: str) -> Iterator[None]:
+        """Let a vehicle be online within a ``with`` block.
+
+        It is so for as long as there is a connection, and again after a loss.
+
+        Parameters
+        ----------
+        vehicle : str
+            Name of the vehicle.
+        """
+        peer = self._asker.peer(self._timeout)
+        withdraw = peer.announce(self._asker.keys.online(vehicle))
+        try:
+            yield
+        finally:
+            withdraw()
 
     def wait_until_ready(self, timeout: float | None = None) -> None:
         """Wait until a server of the site can be asked, also one that starts later.
@@ -160,21 +382,31 @@ class Client:
         ServiceUnreachable
             If there is none in time.
         """
-        timeout = self._timeout if timeout is None else _checked_timeout(timeout)
-        deadline = time.monotonic() + timeout
-        peer = self._connected(timeout, patience=timeout)
+        if timeout is None:
+            timeout = self._timeout
+        deadline = time.monotonic() + _checked_timeout("timeout", timeout)
+        peer = self._asker.peer(timeout, patience=timeout)
         left = max(0.0, deadline - time.monotonic())
-        if not peer.wait_for_token(self._keys.servers, left):
-            reason = f"no server of site {self._keys.site!r} within {timeout:g} s"
-            raise ServiceUnreachable(str(self._endpoint), reason)
+        keys = self._asker.keys
+        if not peer.wait_for_token(keys.servers, left):
+            reason = f"no server of site {keys.site!r} within {timeout:g} s"
+            raise ServiceUnreachable(self._asker.where, reason)
 
     def close(self) -> None:
         """End the connection; more questions are errors."""
-        with self._lock:
-            self._is_closed = True
-            peer, self._peer = self._peer, None
-        if peer is not None:
-            peer.close()
+        self._asker.close()
+
+    def stoppable(self, stop: Stop) -> Self:
+        """Return this client, with the same connection, for questions that `stop` ends.
+
+        Parameters
+        ----------
+        stop : Stop
+            May be set by any thread; then the server is told, too.
+        """
+        view = copy.copy(self)
+        view._stop = stop
+        return view
 
     def __enter__(self) -> Self:
         return self
@@ -187,38 +419,64 @@ class Client:
     ) -> None:
         self.close()
 
-    def _connected(self, timeout: float, patience: float = 0.0) -> Peer:
-        """Return the session, opened if there is none yet."""
-        with self._lock:
-            if self._is_closed:
-                raise ServiceError("the client is closed")
-            if self._peer is None:
-                self._peer = Peer.connected(self._endpoint, timeout, patience)
-            return self._peer
-
     def _ask(self, route: Route, payload: bytes | None = None) -> bytes:
         """Return the payload of the answer to one question."""
-        key = self._keys.of(route)
-        deadline = time.monotonic() + self._timeout
-        peer = self._connected(self._timeout)
-        left = max(0.001, deadline - time.monotonic())
-        replies = peer.ask(key, payload, JSON, left)
-        if not replies:
-            raise ServiceUnreachable(str(self._endpoint), f"nobody answers {key}")
-        # One server is enough, whatever others say.
-        reply = min(replies, key=lambda reply: reply.is_error)
-        if reply.is_error:
-            raise _remote_error(reply)
-        return reply.payload
+        return self._asker.ask(route, payload, self._timeout, self._stop)
+
+    def _ask_question(self, route: Route, question: Question) -> bytes:
+        """Likewise for one that can be cancelled and has a deadline."""
+
+        def payload(name: str, timeout: float) -> bytes:
+            own = {"request": name, "deadline": timeout}
+            return encode(question.model_copy(update=own))
+
+        return self._asker.ask(route, payload, self._timeout, self._stop)
+
+    def _verdicts(
+        self,
+        trajectories: Sequence[Trajectory],
+        vehicles: Sequence[str] | None,
+        allow_unreachable: bool,
+        timeout: float | None,
+    ) -> Iterator[Part]:
+        require_names("trajectories", [timed(one).name for one in trajectories])
+        names = None if vehicles is None else tuple(vehicles)
+        parameters = BatchValidateRequest(
+            vehicles=names, allow_unreachable=allow_unreachable
+        )
+        return asked(
+            self._asker,
+            Route("batch_validate"),
+            questions_of(trajectories, parameters),
+            len(trajectories),
+            _checked_overall(timeout),
+            self._stop or Stop(),
+        )
 
 
-def _remote_error(reply: Reply) -> ServiceError:
-    try:
-        error = decode(ErrorReply, reply.payload)
-    except InvalidMessage:
-        shown = repr(reply.payload[:80])
-        return ServiceError(f"the server sent an error that cannot be read: {shown}")
-    return RemoteError(error.code, error.message, error.field)
+def _endpoints(
+    endpoint: str | Sequence[str], security: Security | None
+) -> list[Endpoint]:
+    """Return the addresses, or raise for the first that is none."""
+    if isinstance(endpoint, str):
+        places = {"endpoint": endpoint}
+    else:
+        places = {f"endpoint[{i}]": text for i, text in enumerate(endpoint)}
+    if not places:
+        raise InvalidInput(Problem("endpoint", "an empty list", "at least one address"))
+    found = []
+    for where, text in places.items():
+        found.append(Endpoint.parse(where, text))
+        check_endpoint(where, found[-1], security)
+    return found
+
+
+def _told(parts: Iterator[Part], progress: Progress | None) -> Iterator[Part]:
+    """Yield parts, and tell of each."""
+    for part in parts:
+        yield part
+        if progress is not None:
+            progress(part.done, part.total)
 
 
 def _read(parse: Callable[[], T]) -> T:
@@ -240,7 +498,11 @@ def _one_each(
     return answers
 
 
-def _checked_timeout(timeout: float) -> float:
+def _checked_overall(timeout: float | None) -> float | None:
+    return None if timeout is None else _checked_timeout("timeout", timeout)
+
+
+def _checked_timeout(where: str, timeout: float) -> float:
     if not (math.isfinite(timeout) and timeout > 0):
-        raise InvalidInput(Problem("timeout", f"{timeout} s", "positive and finite"))
+        raise InvalidInput(Problem(where, f"{timeout} s", "positive and finite"))
     return timeout

@@ -1,16 +1,24 @@
-"""From request to reply, without zenoh: bytes in, bytes out, nothing is changed."""
+"""From request to reply, without zenoh: bytes in, bytes out.
+
+Only ``register`` and ``unregister`` change anything: the registry.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 from configspace.errors import InvalidInput, InvalidVehicle, Problem
 from configspace.space import PermissibleSpace
 from configspace.storage import dump_space
-from omniplan import InvalidTrajectory, select, validate
-from services.errors import InvalidMessage
+from omniplan import InvalidTrajectory, validate
+from omniplan.fleet import ranked_by
+from omniplan.report import Ranking
+from services.answers import Answer, Parts
+from services.arrow import ARROW
+from services.batches import judge_twists, validate_batch
+from services.calls import Call
+from services.errors import CallStopped, InvalidMessage, RegistrationRefused
 from services.keys import Route
 from services.messages import (
     JSON,
@@ -26,24 +34,19 @@ from services.messages import (
     encode,
     trajectories_from,
 )
+from services.registration import change
+from services.registry import Registry
 
-__all__ = ["SHEET", "Answer", "Handlers", "check_size", "error_reply"]
+__all__ = ["SHEET", "Answer", "Handlers", "Parts", "check_size", "error_reply"]
 
 SHEET = "application/octet-stream"
 """Encoding of a data sheet."""
-# Without an encoding zenoh says zenoh/bytes: taken as JSON too.
-_ENCODINGS = (JSON, "zenoh/bytes", "")
+# Without an encoding zenoh says zenoh/bytes: taken as what the key takes.
+_UNNAMED = ("zenoh/bytes", "")
+_BATCHES = ("batch_twists", "batch_validate")
 _MAX_MESSAGE = 4000  # characters of an error reply: it may repeat what was sent
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a server sends back."""
-
-    payload: bytes
-    encoding: str = JSON
 
 
 class Handlers:
@@ -51,25 +54,40 @@ class Handlers:
 
     Parameters
     ----------
-    fleet : mapping of str to PermissibleSpace
-        The vehicles by name; each answer sees one state of it.
+    registry : Registry
+        The vehicles; each answer sees one state of it.
     health : callable
         Returns the state of the server.
-    limits : RequestLimits
+    limits : RequestLimits, optional
+    online : callable, optional
+        Returns the names of the vehicles that are online; default none is.
     """
 
     def __init__(
         self,
-        fleet: Mapping[str, PermissibleSpace],
+        registry: Registry,
         health: Callable[[], Health],
         limits: RequestLimits | None = None,
+        online: Callable[[], frozenset[str]] = frozenset,
     ) -> None:
-        self.fleet = fleet
+        self.registry = registry
         self.limits = limits or RequestLimits()
         self._health = health
+        self._online = online
 
-    def answer(self, route: Route, payload: bytes = b"", encoding: str = "") -> Answer:
-        """Answer one request.
+    @property
+    def fleet(self) -> Mapping[str, PermissibleSpace]:
+        """The vehicles known now, by name; what is returned does not change."""
+        return self.registry.fleet
+
+    def answer(
+        self,
+        route: Route,
+        payload: bytes = b"",
+        encoding: str = "",
+        call: Call | None = None,
+    ) -> Answer | Parts:
+        """Answer one request, at once or in parts.
 
         Parameters
         ----------
@@ -77,15 +95,18 @@ class Handlers:
         payload : bytes
         encoding : str
             Encoding of the payload as zenoh names it.
+        call : Call, optional
+            The request under way; default one without a deadline.
 
         Raises
         ------
         InvalidInput
             If the request cannot be answered; see `error_reply`.
         """
+        call = call or Call.local()
         check_size(len(payload), self.limits)
         if payload:
-            _check_encoding(encoding)
+            _check_encoding(encoding, ARROW if route.verb in _BATCHES else JSON)
         if payload and not route.takes_payload:
             problem = Problem("payload", f"{len(payload)} bytes", "this key takes none")
             raise InvalidMessage(problem)
@@ -97,11 +118,21 @@ class Handlers:
             case "space":
                 return self.space(route.id)
             case "validate":
-                return self.validate(payload)
+                return self.validate(payload, call)
             case "select":
-                return self.select(payload)
+                return self.select(payload, call)
+            case "batch_validate":
+                return validate_batch(payload, self._chosen, self.limits, call)
+            case "batch_twists":
+                return judge_twists(payload, self._chosen, self.limits, call)
             case "health":
                 return self.health()
+            case "register" | "unregister":
+                return Answer(change(self.registry, route, payload))
+            case "cancel":
+                # A server answers it before it comes here.
+                problem = Problem("key", "cancel", "there is nothing under way")
+                raise InvalidMessage(problem, code="unknown_key")
 
     def vehicles(self) -> Answer:
         """Return the names of the vehicles."""
@@ -120,47 +151,75 @@ class Handlers:
         """Return one data sheet."""
         return Answer(dump_space(self._space(name)), SHEET)
 
-    def validate(self, payload: bytes) -> Answer:
+    def validate(self, payload: bytes, call: Call) -> Parts:
         """Judge trajectories for one vehicle."""
         request = decode(ValidateRequest, payload)
+        call.begin(request.request, request.deadline)
         space = self._space(request.vehicle)
         trajectories = trajectories_from(request.trajectories, self.limits)
-        return Answer(
-            encode(ValidateReply.of(validate(t, space) for t in trajectories))
-        )
+        call.n_samples += sum(x.t.size for x in trajectories)
+        reports = []
+        allow = request.allow_unreachable
+        for index, trajectory in enumerate(trajectories):
+            if index:
+                yield None
+            reports.append(validate(trajectory, space, allow_unreachable=allow))
+        return Answer(encode(ValidateReply.of(reports)))
 
-    def select(self, payload: bytes) -> Answer:
+    def select(self, payload: bytes, call: Call) -> Parts:
         """Rank the vehicles for trajectories."""
         request = decode(SelectRequest, payload)
+        call.begin(request.request, request.deadline)
         fleet = self._chosen(request.vehicles)
+        if request.online_only:
+            fleet = _only(fleet, self._online())
         trajectories = trajectories_from(request.trajectories, self.limits)
-        return Answer(
-            encode(SelectReply.of(select(trajectories, fleet, by=request.by)))
+        call.n_samples += sum(x.t.size for x in trajectories)
+        ranked = ranked_by(
+            fleet,
+            request.by,
+            requirements=request.requirements,
+            allow_unreachable=request.allow_unreachable,
         )
+        rankings: list[Ranking] = []
+        for index, trajectory in enumerate(trajectories):
+            if index:
+                yield None
+            rankings.append(ranked(trajectory))
+        return Answer(encode(SelectReply.of(rankings)))
 
     def health(self) -> Answer:
         """Return the state of the server."""
         return Answer(encode(self._health()))
 
     def _chosen(self, names: Sequence[str] | None) -> list[PermissibleSpace]:
+        fleet = self.fleet
         if names is None:
-            return list(self.fleet.values())
+            return list(fleet.values())
         # Repeated names would make a small request arbitrarily much work.
         if len(set(names)) < len(names):
             raise InvalidMessage(
                 Problem("vehicles", "a name stands twice", "each name once")
             )
-        return [self._space(name, f"vehicles[{i}]") for i, name in enumerate(names)]
+        return [
+            _space_of(fleet, name, f"vehicles[{i}]") for i, name in enumerate(names)
+        ]
 
-    def _space(self, name: str, where: str = "vehicle") -> PermissibleSpace:
-        try:
-            return self.fleet[name]
-        except KeyError:
-            known = ", ".join(list(self.fleet)[:20]) or "none"
-            raise InvalidMessage(
-                Problem(where, repr(name)[:80], f"known are {known}"),
-                code="unknown_vehicle",
-            ) from None
+    def _space(self, name: str) -> PermissibleSpace:
+        return _space_of(self.fleet, name, "vehicle")
+
+
+def _space_of(
+    fleet: Mapping[str, PermissibleSpace], name: str, where: str
+) -> PermissibleSpace:
+    try:
+        return fleet[name]
+    except KeyError:
+        known = ", ".join(list(fleet)[:20]) or "none"
+        raise InvalidMessage(
+            Problem(where, repr(name)[:80], f"known are {known}"),
+            code="unknown_vehicle",
+        ) from None
 
 
 def check_size(n_bytes: int, limits: RequestLimits) -> None:
@@ -179,6 +238,11 @@ def error_reply(error: Exception) -> ErrorReply:
     learns nothing of the insides.
     """
     match error:
+        case CallStopped():
+            return ErrorReply(code=error.code, message=str(error))
+        case RegistrationRefused():
+            message = str(error)[:_MAX_MESSAGE]
+            return ErrorReply(code=error.code, message=message, field=error.field)
         case InvalidMessage():
             code = error.code
         case InvalidTrajectory():
@@ -196,10 +260,20 @@ def error_reply(error: Exception) -> ErrorReply:
     return ErrorReply(code=code, message=str(error)[:_MAX_MESSAGE], field=field)
 
 
-def _check_encoding(encoding: str) -> None:
+def _only(
+    fleet: Sequence[PermissibleSpace], online: frozenset[str]
+) -> list[PermissibleSpace]:
+    found = [space for space in fleet if space.name in online]
+    if not found:
+        problem = Problem("online_only", "no vehicle is online", "at least one")
+        raise InvalidInput(problem)
+    return found
+
+
+def _check_encoding(encoding: str, needed: str) -> None:
     # A schema may follow: application/json;omniplan
-    if encoding.partition(";")[0] not in _ENCODINGS:
+    if encoding.partition(";")[0] not in (needed, *_UNNAMED):
         raise InvalidMessage(
-            Problem("encoding", repr(encoding)[:80], f"{JSON} is needed"),
+            Problem("encoding", repr(encoding)[:80], f"{needed} is needed"),
             code="wrong_encoding",
         )

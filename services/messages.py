@@ -6,6 +6,7 @@ texts ``"Infinity"`` and ``"-Infinity"``, in requests they are not allowed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, TypeVar
@@ -14,15 +15,21 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails, from_json
 
 from configspace.errors import InvalidInput, Problem
+from omniplan.fitness import requirements_of
 from omniplan.fleet import Criterion
 from omniplan.report import Ranking, Report
+from omniplan.requirements import Requirement
 from omniplan.trajectory import Trajectory
 from services.errors import InvalidMessage
 
 __all__ = [
     "JSON",
+    "CancelReply",
     "ErrorReply",
     "Health",
+    "KeyHealth",
+    "Message",
+    "Question",
     "RequestLimits",
     "SelectReply",
     "SelectRequest",
@@ -31,6 +38,7 @@ __all__ = [
     "VehiclesReply",
     "decode",
     "encode",
+    "fitting",
     "trajectories_from",
 ]
 
@@ -42,6 +50,9 @@ MAX_PROBLEMS = 20
 Names: TypeAlias = Annotated[tuple[str, ...], Field(strict=False)]
 Objects: TypeAlias = Annotated[tuple[dict[str, Any], ...], Field(strict=False)]
 Count: TypeAlias = Annotated[int, Field(ge=0)]
+Seconds: TypeAlias = Annotated[float, Field(ge=0)]
+CHUNK = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+"""What can stand as one chunk of a key."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +69,10 @@ class RequestLimits:
     """Largest payload, bytes; at most 32 MiB."""
     max_samples: int = 100_000
     """Largest number of samples of all trajectories together."""
+    max_time: float = 60.0
+    """Time for a request from its arrival, s."""
+    max_batch_samples: int = 1_000_000
+    """Largest number of samples, or twists, of a batch in Arrow."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.max_bytes <= 32 * 2**20:
@@ -68,9 +83,17 @@ class RequestLimits:
             raise InvalidInput(
                 Problem("max_samples", f"{self.max_samples}", "at least 1")
             )
+        if self.max_batch_samples < 1:
+            raise InvalidInput(
+                Problem("max_batch_samples", f"{self.max_batch_samples}", "at least 1")
+            )
+        if not 0 < self.max_time < math.inf:
+            raise InvalidInput(
+                Problem("max_time", f"{self.max_time} s", "positive and finite")
+            )
 
 
-class _Message(BaseModel):
+class Message(BaseModel):
     """Frozen, strict, no unknown keys."""
 
     model_config = ConfigDict(
@@ -79,24 +102,44 @@ class _Message(BaseModel):
         strict=True,
         allow_inf_nan=False,
         ser_json_inf_nan="strings",
+        use_attribute_docstrings=True,
     )
 
 
-class ValidateRequest(_Message):
+class Question(Message):
+    """What every question may say about itself."""
+
+    request: Annotated[str, Field(pattern=CHUNK)] | None = None
+    """Name of the request for ``cancel``; one that nobody guesses."""
+    deadline: Annotated[float, Field(gt=0)] | None = None
+    """After this time the answer is of no use, s from the arrival."""
+
+
+class ValidateRequest(Question):
     """The question whether a vehicle can drive trajectories."""
 
     vehicle: str
+    """One of those that the server knows."""
     trajectories: Objects
     """As `Trajectory.to_dict` gives them."""
+    allow_unreachable: bool = False
+    """As for `omniplan.validate`."""
 
     @classmethod
-    def of(cls, trajectories: Iterable[Trajectory], vehicle: str) -> ValidateRequest:
+    def of(
+        cls,
+        trajectories: Iterable[Trajectory],
+        vehicle: str,
+        *,
+        allow_unreachable: bool = False,
+    ) -> ValidateRequest:
         """Return the request for these values."""
         plain = tuple(trajectory.to_dict() for trajectory in trajectories)
-        return _fitting(cls, {"vehicle": vehicle, "trajectories": plain})
+        data = {"vehicle": vehicle, "trajectories": plain}
+        return fitting(cls, {**data, "allow_unreachable": allow_unreachable})
 
 
-class ValidateReply(_Message):
+class ValidateReply(Message):
     """One report for each trajectory, in their order."""
 
     reports: Objects
@@ -112,13 +155,21 @@ class ValidateReply(_Message):
         return tuple(map(Report.from_dict, self.reports))
 
 
-class SelectRequest(_Message):
+class SelectRequest(Question):
     """The question which vehicles can drive trajectories, best first."""
 
     trajectories: Objects
+    """As `Trajectory.to_dict` gives them."""
     vehicles: Names | None = None
     """Which to compare; None for all that the server knows."""
     by: Criterion = "duration"
+    """What is best."""
+    requirements: Annotated[Names, Field(max_length=100)] = ()
+    """What a vehicle must meet besides: phrases of `omniplan.requirements`."""
+    allow_unreachable: bool = False
+    """As for `omniplan.select`."""
+    online_only: bool = False
+    """Compare only vehicles that are online."""
 
     @classmethod
     def of(
@@ -126,14 +177,27 @@ class SelectRequest(_Message):
         trajectories: Iterable[Trajectory],
         vehicles: Iterable[str] | None,
         by: str,
+        requirements: Iterable[Requirement | str] = (),
+        *,
+        allow_unreachable: bool = False,
+        online_only: bool = False,
     ) -> SelectRequest:
         """Return the request for these values."""
         plain = tuple(trajectory.to_dict() for trajectory in trajectories)
         names = None if vehicles is None else tuple(vehicles)
-        return _fitting(cls, {"trajectories": plain, "vehicles": names, "by": by})
+        phrases = tuple(map(str, requirements_of(requirements)))
+        data = {
+            "trajectories": plain,
+            "vehicles": names,
+            "by": by,
+            "requirements": phrases,
+            "allow_unreachable": allow_unreachable,
+            "online_only": online_only,
+        }
+        return fitting(cls, data)
 
 
-class SelectReply(_Message):
+class SelectReply(Message):
     """One ranking for each trajectory, in their order."""
 
     rankings: Objects
@@ -149,13 +213,34 @@ class SelectReply(_Message):
         return tuple(map(Ranking.from_dict, self.rankings))
 
 
-class VehiclesReply(_Message):
+class VehiclesReply(Message):
     """Which vehicles a server knows."""
 
     vehicles: Names
+    """Their names."""
 
 
-class Health(_Message):
+class CancelReply(Message):
+    """Whether the request to be cancelled is under way."""
+
+    cancelled: bool
+    """False also for one that is still to come, which is not begun then."""
+
+
+class KeyHealth(Message):
+    """What a server has answered to one kind of key since its start."""
+
+    codes: dict[str, Count]
+    """Answers by code, ``ok`` among them."""
+    p50: Seconds
+    """Time from arrival to the last reply that half of the answers keep, s."""
+    p90: Seconds
+    """Likewise nine of ten, s."""
+    p99: Seconds
+    """Likewise 99 of 100, s."""
+
+
+class Health(Message):
     """State of a server."""
 
     version: str
@@ -165,31 +250,40 @@ class Health(_Message):
     vehicles: Count
     """Number of vehicles."""
     queue_length: Count
-    """Requests that wait now."""
+    """Requests that wait now, for their first turn or their next."""
     queue_size: Count
     """Requests that may wait; more are answered ``busy``."""
+    queue_bytes: Count
+    """Bytes of large requests that wait or are worked at."""
+    running: Count
+    """Requests that are worked at in this moment."""
     requests: Count
     """Requests received since the start, this one included."""
     errors: Count
     """Error replies since the start."""
-    uptime: Annotated[float, Field(ge=0)]
+    uptime: Seconds
     """Time since the start, s."""
+    memory: Count | None = None
+    """What the process holds in memory, bytes; null where that is not known."""
+    keys: dict[str, KeyHealth] = {}
+    """What was answered, by kind of key: ``validate``, ``space``, ...; ``unknown``."""
 
 
-class ErrorReply(_Message):
+class ErrorReply(Message):
     """Why there is no other reply."""
 
     code: str
     """One of `services.errors.CODES`."""
     message: str
+    """What is wrong, in words: where, what was given, what is allowed."""
     field: str | None = None
     """Path of the offending value within the request."""
 
 
-M = TypeVar("M", bound=_Message)
+M = TypeVar("M", bound=Message)
 
 
-def encode(message: _Message) -> bytes:
+def encode(message: Message) -> bytes:
     """Return a message as JSON."""
     return message.model_dump_json().encode()
 
@@ -208,10 +302,10 @@ def decode(kind: type[M], payload: bytes) -> M:
     except ValueError as error:
         problem = Problem("payload", str(error), "JSON without NaN is needed")
         raise InvalidMessage(problem, kind.__name__) from error
-    return _fitting(kind, data)
+    return fitting(kind, data)
 
 
-def _fitting(kind: type[M], data: object) -> M:
+def fitting(kind: type[M], data: object) -> M:
     """Return the message with these values, or raise InvalidMessage."""
     try:
         return kind.model_validate(data)

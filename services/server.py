@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from types import TracebackType
 from typing import Self
 
 from configspace.errors import InvalidInput, Problem
 from configspace.space import PermissibleSpace
+from services.cores import large_at_once
+from services.dispatch import Dispatcher
 from services.endpoint import DEFAULT_ENDPOINT, Endpoint
-from services.errors import CODES, InvalidMessage, ServiceError
-from services.handlers import Handlers, check_size, error_reply
-from services.keys import Keys, checked_chunk
-from services.messages import JSON, ErrorReply, Health, RequestLimits, encode
-from services.session import Peer, Request
-from services.workers import WorkerPool
+from services.errors import ServiceError
+from services.handlers import Handlers
+from services.keys import Keys
+from services.messages import Health, KeyHealth, RequestLimits
+from services.metrics import KeyFigures, resident_bytes
+from services.registry import Registry
+from services.security import (
+    Security,
+    check_listen,
+    check_peers,
+    zenoh_entries,
+)
+from services.session import Peer
+from services.upkeep import Upkeep
+from services.workers import PoolLimits
 
 __all__ = ["Server"]
 
@@ -29,25 +41,46 @@ class Server:
     """Answers the questions of clients about a fleet; use it in a ``with`` block.
 
     Requests go through a bounded queue to worker threads; what finds the queue full is
-    answered ``busy`` at once. Nothing a client sends changes the server.
+    answered ``busy`` at once. Large requests are worked at in parts and take turns, so
+    that small ones never wait for them. Nothing a client sends changes the server,
+    unless its `registry` takes registrations.
 
     Parameters
     ----------
     fleet : sequence of PermissibleSpace
-        The vehicles, each name once.
+        The vehicles, each name once; no request changes them.
     site : str
         Chunk of the keys that tells servers of different places apart.
     listen : str
-        ``tcp/HOST:PORT``; port 0 takes a free one, see `endpoint`. The default is
-        reached from this machine only; there is no access control yet.
+        ``tcp/HOST:PORT``, or ``tls/HOST:PORT`` with `security`; port 0 takes a free
+        one, see `endpoint`. The default is reached from this machine only.
     workers : int, 1 to 64
-        Threads that answer.
+        Threads that answer; of two or more, one is kept for small requests.
     queue_size : int, ≥ 1
-        Requests that may wait.
+        Requests that may wait, half of them large.
+    queue_bytes : int, bytes, ≥ max_bytes
+        Large requests that wait or are worked at, together.
     max_bytes : int, bytes, 1 to 32 MiB
         Largest payload of a request.
     max_samples : int, ≥ 1
         Largest number of samples in one request.
+    max_batch_samples : int, ≥ 1
+        Likewise in a request of arrays.
+    max_time : float, s, > 0
+        For a request from its arrival; then it is answered ``deadline_exceeded``.
+    stop_within : float, s, ≥ 0
+        How long `close` lets requests finish that have begun.
+    security : Security, optional
+        Certificates, and who may do what; see ``docs/security.md``.
+    allow_insecure : bool
+        Listen without `security` also where other machines reach it: whoever does may
+        ask anything.
+    registry : Registry, optional
+        In place of a fleet: vehicles that may be registered and removed. It is for the
+        one who made it to close it, after the server.
+    peers : sequence of str
+        Where other servers of the site listen, as `listen`; those that are there share
+        their registered vehicles. It is enough if one of two lists the other.
 
     Raises
     ------
@@ -68,7 +101,7 @@ class Server:
 
     def __init__(
         self,
-        fleet: Sequence[PermissibleSpace],
+        fleet: Sequence[PermissibleSpace] = (),
         *,
         site: str = "default",
         listen: str = DEFAULT_ENDPOINT,
@@ -76,24 +109,55 @@ class Server:
         queue_size: int = 64,
         max_bytes: int = 8 * 2**20,
         max_samples: int = 100_000,
+        queue_bytes: int = 64 * 2**20,
+        max_batch_samples: int = 1_000_000,
+        max_time: float = 60.0,
+        stop_within: float = 10.0,
+        security: Security | None = None,
+        allow_insecure: bool = False,
+        registry: Registry | None = None,
+        peers: Sequence[str] = (),
     ) -> None:
         self._keys = Keys(site)
         self._listen = Endpoint.parse("listen", listen)
+        check_listen(self._listen, security, allow_insecure)
+        self._entries = zenoh_entries(security, "server", self._keys)
         if not 1 <= workers <= 64:
             raise InvalidInput(Problem("workers", f"{workers}", "1 to 64"))
         if queue_size < 1:
             raise InvalidInput(Problem("queue_size", f"{queue_size}", "at least 1"))
-        self._n_workers = workers
-        self._queue_size = queue_size
-        limits = RequestLimits(max_bytes, max_samples)
-        self._handlers = Handlers(_by_name(fleet), self.health, limits)
+        if queue_bytes < max_bytes:
+            allowed = f"at least max_bytes, {max_bytes}"
+            raise InvalidInput(Problem("queue_bytes", f"{queue_bytes}", allowed))
+        if not 0 <= stop_within < math.inf:
+            raise InvalidInput(
+                Problem("stop_within", f"{stop_within} s", "finite, not negative")
+            )
+        self._pool_limits = PoolLimits(
+            workers, queue_size, queue_bytes, large_at_once(workers)
+        )
+        self._stop_within = stop_within
+        limits = RequestLimits(
+            max_bytes=max_bytes,
+            max_samples=max_samples,
+            max_batch_samples=max_batch_samples,
+            max_time=max_time,
+        )
+        if registry is not None and fleet:
+            allowed = "none, as a registry has its own"
+            raise InvalidInput(Problem("fleet", f"{len(fleet)} vehicles", allowed))
+        self._peers = [Endpoint.parse(f"peers[{i}]", p) for i, p in enumerate(peers)]
+        check_peers(self._peers, security)
+        self._registry = Registry(fleet) if registry is None else registry
+        self._handlers = Handlers(self._registry, self.health, limits, self._online)
         self._version = version("omniplan")
-        self._counts = {"requests": 0, "errors": 0}
         self._lock = threading.Lock()
         self._closed = threading.Event()
+        self._is_clean = True
         self._started_at = time.monotonic()
         self._peer: Peer | None = None
-        self._pool: WorkerPool[Request] | None = None
+        self._dispatcher: Dispatcher | None = None
+        self._upkeep: Upkeep | None = None
 
     def start(self) -> None:
         """Begin to answer; a server starts once.
@@ -107,36 +171,59 @@ class Server:
         """
         if self._peer is not None or self._closed.is_set():
             raise ServiceError("the server was started before; make a new one")
-        if not self._listen.is_loopback:
-            _log.warning("%s: whoever reaches it may ask", self._listen)
-        self._peer = Peer.listening(self._listen)
+        self._peer = Peer.listening(self._listen, self._entries, self._peers)
         self._started_at = time.monotonic()
-        self._pool = WorkerPool(self._work, self._n_workers, self._queue_size)
+        self._dispatcher = Dispatcher(self._keys, self._handlers, self._pool_limits)
+        receive = self._dispatcher.receive
         try:
-            self._peer.serve(self._keys.everything, self._receive)
+            self._upkeep = Upkeep(
+                self._peer,
+                self._keys,
+                self._registry,
+                receive,
+                expects_others=bool(self._peers),
+            )
+            self._peer.serve(self._keys.everything, receive)
             # The token comes last: who sees it can ask.
             self._peer.announce(self._keys.server(self._peer.instance))
-        except ServiceError:
+        except BaseException:
             self.close()
             raise
         _log.info("%s answers at %s", self._keys.root, self.endpoint)
 
-    def close(self) -> None:
-        """Stop: running requests are finished, waiting ones answered ``closing``."""
+    def close(self, within: float | None = None) -> bool:
+        """Stop: requests that have begun may finish, others are answered ``closing``.
+
+        Parameters
+        ----------
+        within : float, s, ≥ 0, optional
+            What takes longer is stopped as well; default `stop_within`.
+
+        Returns
+        -------
+        is_clean : bool
+            Whether all that had begun were finished; on a second call the same.
+        """
         with self._lock:
-            if self._closed.is_set():
-                return
-            self._closed.set()
-        if self._peer is None or self._pool is None:
-            return
+            if not self._closed.is_set():
+                self._is_clean = self._close(within)
+                self._closed.set()
+            return self._is_clean
+
+    def _close(self, within: float | None) -> bool:
+        if self._peer is None or self._dispatcher is None:
+            return True
         try:
             self._peer.withdraw()
-            for request in self._pool.stop():
-                self._refuse(request, _coded("closing"))
-            self._pool.join()
+            is_clean = self._dispatcher.close(
+                self._stop_within if within is None else within
+            )
         finally:
+            if self._upkeep is not None:
+                self._upkeep.close()
             self._peer.close()
         _log.info("%s closed", self._keys.root)
+        return is_clean
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until `close` was called by another thread; Ctrl-C ends the wait.
@@ -162,19 +249,33 @@ class Server:
         """The site that it answers for."""
         return self._keys.site
 
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """Names of the vehicles that it answers for now."""
+        return tuple(self._handlers.fleet)
+
     def health(self) -> Health:
         """Return the state, as the key ``health`` does."""
-        with self._lock:
-            counts = dict(self._counts)
+        at_work = self._dispatcher
         return Health(
             version=self._version,
             instance="" if self._peer is None else self._peer.instance,
             vehicles=len(self._handlers.fleet),
-            queue_length=0 if self._pool is None else len(self._pool),
-            queue_size=self._queue_size,
+            queue_length=0 if at_work is None else len(at_work.pool),
+            queue_size=self._pool_limits.queue_size,
+            queue_bytes=0 if at_work is None else at_work.pool.n_bytes,
+            running=0 if at_work is None else at_work.pool.n_running,
+            requests=0 if at_work is None else at_work.n_requests,
+            errors=0 if at_work is None else at_work.n_errors,
             uptime=time.monotonic() - self._started_at,
-            **counts,
+            memory=resident_bytes(),
+            keys={} if at_work is None else _key_health(at_work.metrics.figures()),
         )
+
+    def _online(self) -> frozenset[str]:
+        """Return the names of the vehicles that are online."""
+        upkeep = self._upkeep
+        return frozenset() if upkeep is None else upkeep.presence.online()
 
     def __enter__(self) -> Self:
         self.start()
@@ -188,77 +289,9 @@ class Server:
     ) -> None:
         self.close()
 
-    def _receive(self, request: Request) -> None:
-        """Take a request from zenoh's thread: no decoding, no waiting."""
-        self._count("requests")
-        try:
-            # Looked at here so that the queue never holds what is too large.
-            check_size(request.n_bytes, self._handlers.limits)
-        except InvalidMessage as error:
-            self._refuse(request, error_reply(error))
-            return
-        if self._pool is None or not self._pool.submit(request):
-            code = "closing" if self._closed.is_set() else "busy"
-            self._refuse(request, _coded(code))
 
-    def _work(self, request: Request) -> None:
-        """Answer a request in a worker; the boundary that no error passes."""
-        with request:
-            for key in self._asked(request):
-                try:
-                    route = self._keys.route(key)
-                    answer = self._handlers.answer(
-                        route, request.payload, request.encoding
-                    )
-                    request.reply(key, answer.payload, answer.encoding)
-                except ServiceError as error:
-                    _log.warning("%s", error)
-                except Exception as error:
-                    self._fail(request, error_reply(error))
-
-    def _asked(self, request: Request) -> Iterable[str]:
-        """Return the concrete keys that a request asks for.
-
-        A wildcard stands for what can be read or, with a payload, for questions.
-        """
-        if not request.is_wild:
-            return (request.key,)
-        has_payload = request.n_bytes > 0
-        return [
-            key
-            for key in self._keys.all_of(self._handlers.fleet)
-            if request.matches(key)
-            and self._keys.route(key).takes_payload == has_payload
-        ]
-
-    def _refuse(self, request: Request, reply: ErrorReply) -> None:
-        with request:
-            self._fail(request, reply)
-
-    def _fail(self, request: Request, reply: ErrorReply) -> None:
-        self._count("errors")
-        try:
-            request.fail(encode(reply), JSON)
-        except ServiceError as error:
-            _log.warning("%s", error)
-
-    def _count(self, what: str) -> None:
-        with self._lock:
-            self._counts[what] += 1
-
-
-def _by_name(fleet: Sequence[PermissibleSpace]) -> dict[str, PermissibleSpace]:
-    """Return the fleet by name, or raise where a name repeats or fits no key."""
-    spaces: dict[str, PermissibleSpace] = {}
-    for index, space in enumerate(fleet):
-        where = f"fleet[{index}].name"
-        if checked_chunk(where, space.name) in spaces:
-            raise InvalidInput(
-                Problem(where, f"{space.name!r} again", "each vehicle once")
-            )
-        spaces[space.name] = space
-    return spaces
-
-
-def _coded(code: str) -> ErrorReply:
-    return ErrorReply(code=code, message=CODES[code])
+def _key_health(figures: dict[str, KeyFigures]) -> dict[str, KeyHealth]:
+    return {
+        kind: KeyHealth(codes=found.codes, p50=found.p50, p90=found.p90, p99=found.p99)
+        for kind, found in figures.items()
+    }

@@ -10,6 +10,7 @@ import omniplan
 from services.session import Reply
 
 ANY_PORT = "tcp/127.0.0.1:0"
+ANY_TLS_PORT = "tls/127.0.0.1:0"
 Ask: TypeAlias = Callable[..., list[Reply]]
 Fleet: TypeAlias = Sequence[configspace.PermissibleSpace]
 Trajectories: TypeAlias = Sequence[omniplan.Trajectory]

@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from loopback import ANY_PORT, Ask, Fleet, Trajectories
@@ -95,11 +96,14 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
     gate = Gate()
 
     def held(
-        trajectory: omniplan.Trajectory, space: configspace.PermissibleSpace
+        trajectory: omniplan.Trajectory,
+        space: configspace.PermissibleSpace,
+        *,
+        allow_unreachable: bool = False,
     ) -> omniplan.Report:
         gate.entered.release()
         assert gate.opened.wait(30)
-        return omniplan.validate(trajectory, space)
+        return omniplan.validate(trajectory, space, allow_unreachable=allow_unreachable)
 
     monkeypatch.setattr("services.handlers.validate", held)
     yield gate
@@ -112,9 +116,9 @@ def submitted(monkeypatch: pytest.MonkeyPatch) -> threading.Semaphore:
     semaphore = threading.Semaphore(0)
     submit = WorkerPool.submit
 
-    def counted(pool: WorkerPool[object], job: object) -> bool:
+    def counted(pool: WorkerPool[object], job: object, **options: Any) -> bool:
         try:
-            return submit(pool, job)
+            return submit(pool, job, **options)
         finally:
             semaphore.release()
 

@@ -224,7 +224,7 @@ def test_serve_answers_queries_until_it_is_stopped(
             assert cli.main(["query", "select", turn, *to_it]) == 0
             assert "│ mecanum │" in capsys.readouterr().out
             file = str(tmp_path / "verdicts.parquet")
-            many = ["query", "many", turn, "--output", file, "--json", *to_it]
+            many = ["query", "many", turn, "--output", file, *to_it]
             assert run_json(capsys, *many) == {"output": file, "pairs": 1, "valid": 1}
         finally:
             server.terminate()
@@ -246,7 +246,8 @@ def test_mistakes_in_a_servers_configuration_are_bad_input(
 
 
 def test_the_schema_of_every_message_is_published(capsys: Capture) -> None:
-    names = run_json(capsys, "schema", "messages", "--json")
+    names = run_json(capsys, "schema", "messages")
+    assert isinstance(names, list)
     assert "BatchValidateRequest" in names
     for name in names:
         schema = run_json(capsys, "schema", name)

@@ -103,6 +103,23 @@ def test_a_mecanum_vehicle_turns_no_wheels(space_of: SpaceOf) -> None:
     assert validate(legs(1, 1j, speed=0.3), space_of("mecanum")).valid
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_of_two_refused_representations_the_one_that_breaks_less_is_named(
+    way: int,
+) -> None:
+    # Straight ahead breaks the range of one wheel, half a turn on those of two.
+    ranges = {"one": (100.0, 220.0), "two": (-20.0, 20.0), "three": (-30.0, 10.0)}
+    wheels = [
+        {"id": name, "type": "steered", "x": x, "y": 0.2, "max_speed": 1.0,
+         "steering_range_deg": ranges[name]}
+        for x, name in enumerate(ranges)
+    ]  # fmt: skip
+    vehicle = vehicle_from_data({"name": "three", "wheels": wheels})
+    space = configspace.build_space(vehicle, Grid(40, 72), cache=False)
+    report = validate(legs(way + 0j), space)
+    assert {(v.limit, v.wheel) for v in report.violations} == {("STEER_RANGE", "one")}
+
+
 def test_a_cusp_keeps_the_configuration() -> None:
     for steering_range in ((-155.0, 155.0), None):
         space = rectangle(steering_range, 180)

@@ -6,6 +6,8 @@ import pytest
 
 from configspace import InvalidInput
 from omniplan.report import Candidate, Ranking, Report, Violation
+from omniplan.requirements import Crab
+from omniplan.shortfalls import Shortfall, Unfit
 from omniplan.trajectory import Trajectory
 from services.errors import InvalidMessage
 from services.messages import (
@@ -59,7 +61,14 @@ def report() -> Report:
 
 
 def test_reports_and_rankings_survive_json_unchanged(report: Report) -> None:
-    ranking = Ranking("x", "margin", (Candidate("agv", 0.1, report),), (report,))
+    short = Shortfall("payload 5 kg", "", 5.0, None, "kg", None, None)
+    ranking = Ranking(
+        "x",
+        "margin",
+        (Candidate("agv", 0.1, report),),
+        (report,),
+        (Unfit("cart", (short,)),),
+    )
     reports = decode(ValidateReply, encode(ValidateReply.of([report, report])))
     assert reports.values() == (report, report)
     rankings = decode(SelectReply, encode(SelectReply.of([ranking])))
@@ -72,6 +81,9 @@ def test_requests_survive_json_unchanged() -> None:
     select = SelectRequest.of([trajectory], ["agv"], "margin")
     assert decode(ValidateRequest, encode(validate)) == validate
     assert decode(SelectRequest, encode(select)) == select
+    asked = SelectRequest.of([], None, "manoeuvrability", [Crab(0.5), "no-mirroring"])
+    assert decode(SelectRequest, encode(asked)) == asked
+    assert asked.requirements[1] == "no mirroring"
     (back,) = trajectories_from(validate.trajectories, RequestLimits())
     assert (back.t == trajectory.t).all()
     assert (back.samples == trajectory.samples).all()
@@ -80,6 +92,7 @@ def test_requests_survive_json_unchanged() -> None:
 def test_what_may_be_left_out_has_its_default() -> None:
     request = decode(SelectRequest, b'{"trajectories": []}')
     assert (request.vehicles, request.by) == (None, "duration")
+    assert request.requirements == ()
     assert decode(ErrorReply, b'{"code": "busy", "message": "later"}').field is None
 
 
@@ -121,3 +134,14 @@ def test_not_more_than_twenty_mistakes_are_listed() -> None:
 def test_limits_outside_their_range_are_refused(limits: dict[str, int]) -> None:
     with pytest.raises(InvalidInput, match=next(iter(limits))):
         RequestLimits(**limits)
+
+
+def test_more_than_a_hundred_requirements_are_refused() -> None:
+    payload = b'{"trajectories": [], "requirements": [' + b'"no mirroring",' * 100
+    with pytest.raises(InvalidMessage, match="requirements"):
+        decode(SelectRequest, payload + b'"no mirroring"]}')
+
+
+def test_requests_take_no_phrase_that_is_none() -> None:
+    with pytest.raises(InvalidInput, match="phrase: 'fly'"):
+        SelectRequest.of([], None, "duration", ["fly"])

@@ -1,0 +1,222 @@
+"""The bars of the service, each as a ratio within one run.
+
+    python benchmarks/bench_service.py [--queries 2000] [--samples 1000000]
+
+A server (`omniplan serve`), a bare zenoh echo and this client are three processes on
+loopback. Small queries alternate with echoes that carry as many bytes both ways; batches
+over the service alternate with the same call within this process. It prints JSON.
+`bench_service_load.py` has small queries beside a batch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import zenoh  # noqa: TID251 - what the service is compared with
+
+import configspace
+import omniplan
+from services import Client
+from services.keys import Keys, Route
+from services.messages import Health, ValidateReply, ValidateRequest, encode
+
+VEHICLE = "mecanum"
+PER_TRAJECTORY = 10_000
+
+ECHO = """
+import json, sys, threading
+import zenoh
+config = zenoh.Config()
+for key, value in json.loads(sys.argv[1]).items():
+    config.insert_json5(key, json.dumps(value))
+session = zenoh.open(config)
+def answer(query):
+    size = int(str(query.selector.parameters) or 0)
+    query.reply("echo", b"x" * size)
+session.declare_queryable("echo", answer)
+print("ready", flush=True)
+threading.Event().wait()
+"""
+
+
+def wave(n: int, name: str) -> omniplan.Trajectory:
+    """Return a slow drive along a wave of n samples."""
+    t = np.linspace(0.0, 20.0, n)
+    poses = np.column_stack([0.2 * t, 0.05 * np.sin(t), 0.1 * np.sin(0.5 * t)])
+    return omniplan.Trajectory.from_poses(t, poses, name=name)
+
+
+def entries(**more: object) -> dict[str, object]:
+    """Return zenoh's configuration: as that of the service."""
+    off = ("scouting/multicast/enabled", "scouting/gossip/enabled")
+    off += ("transport/shared_memory/enabled",)
+    return {"mode": "peer", **dict.fromkeys(off, False), **more}
+
+
+@contextlib.contextmanager
+def echo() -> Iterator[Callable[[bytes | None, int], None]]:
+    """Yield a function that sends bytes to a bare zenoh peer and gets so many back."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    listen = {"listen/endpoints": [endpoint], "connect/endpoints": []}
+    command = [sys.executable, "-c", ECHO, json.dumps(entries(**listen))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        config = zenoh.Config()
+        connect = {"listen/endpoints": [], "connect/endpoints": [endpoint]}
+        for key, value in entries(**connect).items():
+            config.insert_json5(key, json.dumps(value))
+        session = zenoh.open(config)
+
+        def ask(payload: bytes | None, size: int) -> None:
+            for reply in session.get(f"echo?{size}", payload=payload):
+                assert reply.ok is not None
+                assert len(reply.ok.payload.to_bytes()) == size
+
+        while True:  # until the queryable is known
+            with contextlib.suppress(StopIteration):
+                next(iter(session.get("echo?1")))
+                break
+        yield ask
+        session.close()  # type: ignore[no-untyped-call]
+        process.kill()
+
+
+@contextlib.contextmanager
+def served() -> Iterator[str]:
+    """Yield the endpoint of a server in a process of its own."""
+    command = [sys.executable, "-m", "omniplan.cli", "serve", "--json"]
+    command += ["--fleet", VEHICLE, "--listen", "tcp/127.0.0.1:0"]
+    with subprocess.Popen(
+        [*command, "--log-level", "warning"], stdout=subprocess.PIPE, text=True
+    ) as server:
+        assert server.stdout is not None
+        text = ""
+        while not text.endswith("}\n"):
+            line = server.stdout.readline()
+            if not line:
+                raise SystemExit("the server has not started")
+            text += line
+        yield json.loads(text)["endpoint"]
+        server.terminate()
+
+
+def elapsed(call: Callable[[], object]) -> float:
+    """Return how long a call takes, s."""
+    began = time.perf_counter()
+    call()
+    return time.perf_counter() - began
+
+
+def alternated(calls: dict[str, Callable[[], object]], n: int) -> dict[str, list[float]]:
+    """Return the times of calls that take turns, s."""
+    for call in calls.values():
+        call()
+    found: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(n):
+        for name, call in calls.items():
+            found[name].append(elapsed(call))
+    return found
+
+
+def small(client: Client, ask_echo: Callable[[bytes | None, int], None], n: int) -> Any:
+    """Measure small queries against echoes of the same size."""
+    motion = wave(20, "short")
+    vehicles = len(b'{"vehicles":["mecanum"]}')
+    health = client.health()
+    asked = encode(ValidateRequest.of([motion], VEHICLE))
+    reports = client.validate([motion], VEHICLE)
+    answered = len(encode(ValidateReply.of(reports)))
+    space = configspace.build_space(configspace.load_vehicle(VEHICLE))
+    cases: dict[str, tuple[Callable[[], object], bytes | None, int]] = {
+        Keys("default").of(Route("vehicles")): (client.vehicles, None, vehicles),
+        Keys("default").of(Route("health")): (client.health, None, size_of(health)),
+        Keys("default").of(Route("validate")): (
+            lambda: client.validate([motion], VEHICLE),
+            asked,
+            answered,
+        ),
+    }
+    result = {}
+    for key, (call, payload, size) in cases.items():
+        name = key.rpartition("/")[2]
+        calls: dict[str, Callable[[], object]] = {
+            "query": call,
+            "echo": lambda payload=payload, size=size: ask_echo(payload, size),  # type: ignore[misc]
+        }
+        if payload is not None:
+            calls["in_process"] = lambda: omniplan.validate(motion, space)
+        times = alternated(calls, n)
+        p50 = {kind: float(np.median(values)) for kind, values in times.items()}
+        result[name] = {f"{kind}_p50_ms": 1e3 * value for kind, value in p50.items()}
+        result[name]["ratio"] = p50["query"] / p50["echo"]
+    return result
+
+
+def size_of(health: Health) -> int:
+    return len(encode(health))
+
+
+def batches(client: Client, samples: int, n: int) -> Any:
+    """Measure batches over the service against those within this process."""
+    space = configspace.build_space(configspace.load_vehicle(VEHICLE))
+    motions = [wave(PER_TRAJECTORY, f"{i}") for i in range(samples // PER_TRAJECTORY)]
+    rng = np.random.default_rng(0)
+    twists = rng.normal(0.0, 0.3, (samples, 3)).astype(np.float32)
+    pairs: dict[str, dict[str, Callable[[], object]]] = {
+        "validate_many": {
+            "service": lambda: client.validate_many(motions, [VEHICLE]),
+            "in_process": lambda: omniplan.validate_many(motions, [space]),
+        },
+        "check_twists": {
+            "service": lambda: client.check_twists(twists, VEHICLE),
+            "in_process": lambda: omniplan.check_twists(twists, space),
+        },
+    }
+    result = {}
+    for name, calls in pairs.items():
+        times = alternated(calls, n)
+        best = {kind: min(values) for kind, values in times.items()}
+        median = {kind: float(np.median(values)) for kind, values in times.items()}
+        result[name] = {
+            **{f"{kind}_samples_per_s": samples / value for kind, value in best.items()},
+            "ratio_of_best": best["in_process"] / best["service"],
+            "ratio_of_medians": median["in_process"] / median["service"],
+        }
+    return result
+
+
+def main() -> None:
+    """Measure and print JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--queries", type=int, default=2000)
+    parser.add_argument("--samples", type=int, default=10**6)
+    parser.add_argument("--rounds", type=int, default=7)
+    options = parser.parse_args()
+    result: dict[str, Any] = {"load_before": os.getloadavg()[0]}
+    with (
+        served() as endpoint,
+        echo() as ask_echo,
+        Client(endpoint, timeout=120.0) as client,
+    ):
+        client.wait_until_ready()
+        result["small"] = small(client, ask_echo, options.queries)
+        result["batches"] = batches(client, options.samples, options.rounds)
+    result["load_after"] = os.getloadavg()[0]
+    json.dump(result, sys.stdout, indent=2)
+    sys.stdout.write("\n")
+
+
+if __name__ == "__main__":
+    main()
