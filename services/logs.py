@@ -6,13 +6,28 @@ have sent stands in them quoted, so that no request can write a line of its own.
 
 from __future__ import annotations
 
+import atexit
 import json
 import logging
+import logging.handlers
+import queue
 import sys
 import time
 from typing import Literal, TextIO, TypeAlias
 
-__all__ = ["JsonFormatter", "LogFormat", "LogLevel", "TextFormatter", "configure"]
+__all__ = [
+    "JsonFormatter",
+    "LogFormat",
+    "LogLevel",
+    "Relay",
+    "TextFormatter",
+    "configure",
+]
+
+QUEUE_SIZE = 10_000
+"""Records that may wait to be written; more are dropped."""
+LAST_WORDS = 1.0
+"""How long the end of the process waits for records to be written, s."""
 
 LogLevel: TypeAlias = Literal["debug", "info", "warning", "error"]
 LogFormat: TypeAlias = Literal["text", "json"]
@@ -20,8 +35,11 @@ LogFormat: TypeAlias = Literal["text", "json"]
 
 def configure(
     level: LogLevel, format: LogFormat, stream: TextIO | None = None
-) -> logging.Handler:
-    """Send the records of this process to a stream.
+) -> Relay:
+    """Send the records of this process to a stream, from a thread of its own.
+
+    A reader who has stopped reading stops no request: records that find the queue full
+    are dropped and counted.
 
     Parameters
     ----------
@@ -33,15 +51,58 @@ def configure(
 
     Returns
     -------
-    handler : logging.Handler
+    handler : Relay
         The one added to the root logger.
     """
-    handler = logging.StreamHandler(stream or sys.stderr)
-    handler.setFormatter(JsonFormatter() if format == "json" else TextFormatter())
+    writer = logging.StreamHandler(stream or sys.stderr)
+    writer.setFormatter(JsonFormatter() if format == "json" else TextFormatter())
+    handler = Relay(writer)
     root = logging.getLogger()
     root.addHandler(handler)
     root.setLevel(level.upper())
+    atexit.register(handler.drain, LAST_WORDS)
     return handler
+
+
+class Relay(logging.handlers.QueueHandler):
+    """Hands records to a thread that writes them; never waits.
+
+    Parameters
+    ----------
+    writer : logging.Handler
+    size : int
+        Records that may wait.
+    """
+
+    def __init__(self, writer: logging.Handler, size: int = QUEUE_SIZE) -> None:
+        self._records: queue.Queue[logging.LogRecord] = queue.Queue(size)
+        super().__init__(self._records)
+        self.n_dropped = 0
+        """Records that found the queue full."""
+        logging.handlers.QueueListener(self._records, writer).start()
+
+    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
+        """Return the record as it is: it stays within the process."""
+        return record
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Put a record into the queue, or drop it."""
+        try:
+            self._records.put_nowait(record)
+        except queue.Full:
+            self.n_dropped += 1
+
+    def drain(self, timeout: float) -> bool:
+        """Wait until all records are written; return whether they are.
+
+        Parameters
+        ----------
+        timeout : float, s
+        """
+        deadline = time.monotonic() + timeout
+        while self._records.unfinished_tasks and time.monotonic() < deadline:
+            time.sleep(0.005)
+        return not self._records.unfinished_tasks
 
 
 class JsonFormatter(logging.Formatter):

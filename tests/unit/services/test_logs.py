@@ -3,13 +3,14 @@ from __future__ import annotations
 import io
 import json
 import logging
+import threading
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.logs import JsonFormatter, LogFormat, TextFormatter, configure
+from services.logs import JsonFormatter, LogFormat, Relay, TextFormatter, configure
 
 
 @pytest.fixture
@@ -63,16 +64,37 @@ def test_errors_are_logged_with_their_traceback(
     root: logging.Logger, format: LogFormat
 ) -> None:
     stream = io.StringIO()
-    configure("warning", format, stream)
+    relay = configure("warning", format, stream)
     log = logging.getLogger("services.test")
     log.info("left out")
     try:
         raise ValueError("broken")
     except ValueError:
         log.exception("failed")
+    assert relay.drain(5.0)
     text = stream.getvalue()
     assert "left out" not in text
     assert "ValueError: broken" in text
     if format == "json":
         (line,) = text.splitlines()
         assert "Traceback" in json.loads(line)["exception"]
+
+
+def test_a_reader_who_stops_reading_stops_nobody() -> None:
+    """The writer hangs, as at a full pipe; records are dropped, callers go on."""
+    is_free, is_begun = threading.Event(), threading.Event()
+
+    class Hanging(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            is_begun.set()
+            is_free.wait(30)
+
+    relay = Relay(Hanging(), size=4)
+    relay.handle(record("first"))
+    assert is_begun.wait(10)
+    for i in range(10):
+        relay.handle(record(f"record {i}"))
+    assert relay.n_dropped == 6
+    assert not relay.drain(0.02)
+    is_free.set()
+    assert relay.drain(10.0)
