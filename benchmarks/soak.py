@@ -1,11 +1,15 @@
-"""Two servers under mixed load for minutes, one of them killed again and again.
+"""Two servers under mixed load for minutes, killed again and again.
 
     python benchmarks/soak.py [--minutes 10] [--kill-every 20]
 
-The servers are processes of `omniplan serve` with registration, each with its own store.
-Threads ask them everything, and compare every answer with that of the same call within
+The servers are processes of `omniplan serve` with registration, each with its store.
+Threads ask them everything, and compare every answer with that of the same call in
 this process. It prints JSON: requests, latencies, what was lost or wrong, memory; the
 exit code is 1 if anything was lost, wrong, or logged as an error, or memory has grown.
+
+In the first half the servers are killed in turn: after a kill all load is at the other,
+which is killed next. In the second half the first one lives on, with all the load, and
+its memory is looked at.
 """
 
 from __future__ import annotations
@@ -78,6 +82,7 @@ class Process:
             )
 
     def wait_until_ready(self) -> None:
+        """Wait until it answers."""
         assert self._process.stdout is not None
         while self._process.stdout.readline() != b"}\n":
             if self._process.poll() is not None:
@@ -90,7 +95,7 @@ class Process:
         return int(statm.split()[1]) * resource.getpagesize()
 
     def end(self, number: signal.Signals) -> int:
-        """Send a signal, wait and return the exit code."""
+        """Send a signal if it still runs, wait and return the exit code."""
         self._process.send_signal(number)
         code = self._process.wait(60)
         assert self._process.stdout is not None
@@ -134,13 +139,12 @@ class Answers:
 class Record:
     """What has happened; of all threads."""
 
-    latencies: dict[str, list[float]] = field(
-        default_factory=lambda: defaultdict(list)
-    )
+    latencies: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     lost: list[str] = field(default_factory=list)
     wrong: list[str] = field(default_factory=list)
 
     def kinds(self) -> dict[str, Any]:
+        """Return number and latencies of each kind of question."""
         return {
             kind: {
                 "n": len(values),
@@ -169,6 +173,7 @@ class Load:
         self._n_changes = 0
 
     def run(self, is_over: threading.Event) -> None:
+        """Ask until it is over."""
         kinds: list[tuple[str, int, Callable[[Client], bool]]] = [
             ("validate", 30, self._validate),
             ("select", 8, self._select),
@@ -297,13 +302,36 @@ def errors_in(log: Path) -> list[str]:
     return [x for x in lines if '"level": "error"' in x or "Traceback" in x]
 
 
+@contextlib.contextmanager
+def started(folder: Path, endpoints: list[str]) -> Iterator[list[Process]]:
+    """Yield the servers; those of the list run no longer afterwards."""
+    servers = [Process(folder, i, endpoints) for i in range(len(endpoints))]
+    try:
+        for server in servers:
+            server.wait_until_ready()
+        yield servers
+    finally:
+        for server in servers:
+            server.end(signal.SIGKILL)
+
+
 def soak(folder: Path, seconds: float, kill_every: float, n: int) -> dict[str, Any]:
     """Run the load and return what has happened."""
-    answers, record = Answers(), Record()
     endpoints = free_endpoints()
-    servers = [Process(folder, i, endpoints) for i in range(2)]
-    for server in servers:
-        server.wait_until_ready()
+    with started(folder, endpoints) as servers:
+        return run(folder, endpoints, servers, seconds, kill_every, n)
+
+
+def run(
+    folder: Path,
+    endpoints: list[str],
+    servers: list[Process],
+    seconds: float,
+    kill_every: float,
+    n: int,
+) -> dict[str, Any]:
+    """Ask the servers, kill and start them again, and return what has happened."""
+    answers, record = Answers(), Record()
     loads = [Load(i, endpoints[:: 1 - 2 * (i % 2)], answers, record) for i in range(n)]
     memory: list[int] = []
     peaks = [0]
@@ -312,12 +340,15 @@ def soak(folder: Path, seconds: float, kill_every: float, n: int) -> dict[str, A
         began = time.monotonic()
         next_kill = began + kill_every
         while (now := time.monotonic()) < began + seconds:
-            memory.append(servers[0].memory)
-            peaks[-1] = max(peaks[-1], servers[1].memory)
+            is_first_half = now < began + seconds / 2
+            if not is_first_half:
+                memory.append(servers[0].memory)
+            peaks[-1] = max(peaks[-1], *(server.memory for server in servers))
             if now >= next_kill:
-                servers[1].end(signal.SIGKILL)
-                servers[1] = Process(folder, 1, endpoints)
-                servers[1].wait_until_ready()
+                victim = (n_kills + 1) % 2 if is_first_half else 1
+                servers[victim].end(signal.SIGKILL)
+                servers[victim] = Process(folder, victim, endpoints)
+                servers[victim].wait_until_ready()
                 peaks.append(0)
                 n_kills += 1
                 next_kill += kill_every
@@ -342,7 +373,7 @@ def soak(folder: Path, seconds: float, kill_every: float, n: int) -> dict[str, A
             "settled": round(float(settled) / 2**20, 1),
             "last": round(float(last) / 2**20, 1),
             "peak": round(max(memory) / 2**20, 1),
-            "peaks_of_the_killed": [round(peak / 2**20, 1) for peak in peaks],
+            "peaks_between_kills": [round(peak / 2**20, 1) for peak in peaks],
         },
         "has_grown": bool(last > settled + SLACK),
         "health": health.model_dump(),

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from configspace import cache as space_cache
 from configspace import kernels
-from configspace.errors import InvalidVehicle, Problem
+from configspace.errors import InvalidInput, InvalidVehicle, Problem
 from configspace.exact import active_rows
 from configspace.grid import Grid, edges_of
 from configspace.limits import LoadRow, SectorRow, rows_of
@@ -57,6 +57,8 @@ def build_space(
     ------
     InvalidVehicle
         If some permitted configuration has no speed limit at all.
+    InvalidInput
+        If the vehicle is none, but the name of one.
 
     Examples
     --------
@@ -65,6 +67,7 @@ def build_space(
     >>> bool(space.contains(0.0, 0.0, 1.2))
     True
     """
+    _require_vehicle(vehicle)
     grid = grid or Grid()
     if cache is False:
         return _compute(vehicle, grid)
@@ -75,6 +78,12 @@ def build_space(
     space = _compute(vehicle, grid)
     space_cache.write(folder, space)
     return space
+
+
+def _require_vehicle(given: object) -> None:
+    if not isinstance(given, Vehicle):
+        allowed = "a Vehicle: load_vehicle(name)"
+        raise InvalidInput(Problem("vehicle", repr(given)[:60], allowed))
 
 
 def _compute(vehicle: Vehicle, grid: Grid) -> PermissibleSpace:

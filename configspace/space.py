@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.boxes import bilinear, box_states, column_of, row_of
+from configspace.errors import InvalidInput, Problem
 from configspace.exact import LINE_TOLERANCE, exact_reason, exact_v_max
 from configspace.grid import Grid, edges_of
 from configspace.kernels import BLOCKED, FREE, MIXED
@@ -26,7 +27,7 @@ from configspace.vehicle import Vehicle
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["PermissibleSpace"]
+__all__ = ["PermissibleSpace", "require_space"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -400,3 +401,10 @@ class PermissibleSpace:
         reverse: bool,
     ) -> FloatArray:
         return bilinear(self.tables.load[self._direction(reverse)], row, column, fk, fb)
+
+
+def require_space(given: object, where: str = "space") -> None:
+    """Raise InvalidInput unless a value is a space, not a vehicle or its name."""
+    if not isinstance(given, PermissibleSpace):
+        allowed = "a PermissibleSpace: build_space(load_vehicle(name))"
+        raise InvalidInput(Problem(where, type(given).__name__, allowed))

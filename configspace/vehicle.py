@@ -94,7 +94,7 @@ class SteerableWheel(_RollingWheel):
     )
     max_steering_rate_deg: DegreeRate | None = Field(None, description="degrees/s")
     max_steering_acceleration_deg: DegreeRate | None = Field(
-        None, description="degrees/s²; not judged yet, reports say so"
+        None, description="degrees/s²; judged for timed poses, else reports say so"
     )
     steering_coupling: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = Field(
         0.0,

@@ -124,9 +124,8 @@ def parse_vehicle(text: str, subject: str = "vehicle") -> Vehicle:
 def vehicle_from_data(data: object, subject: str = "vehicle") -> Vehicle:
     """Return the vehicle described by plain data, as a message or file holds it."""
     if not isinstance(data, dict):
-        problem = Problem(
-            "the text", type(data).__name__, "a mapping with name and wheels"
-        )
+        given = "nothing" if data is None else _shorten(data)
+        problem = Problem("the text", given, "a mapping with name and wheels is needed")
         raise InvalidVehicle(problem, subject)
     try:
         text = json.dumps(data, default=str)
@@ -204,8 +203,31 @@ def _problems(errors: list[ErrorDetails], data: dict[Any, Any]) -> Iterator[Prob
             error["type"] == "too_short" and error["loc"] == ("wheels",) and wheels
         ):
             yield _problem(error)
-    if isinstance(wheels, list) and all(e["type"] != "conflicts" for e in errors):
+    if any(error["type"] == "conflicts" for error in errors):
+        return
+    footprint = data.get("footprint")
+    if isinstance(footprint, list) and 0 < len(footprint) < 3:
+        given = f"{len(footprint)} points"
+        yield Problem("footprint", given, "a polygon needs at least three points")
+    if isinstance(wheels, list):
+        told = {e["loc"][1] for e in errors if e["type"] == "steering_range"}
+        yield from _turned_ranges(wheels, told)
         yield from _conflicts([w for w in wheels if isinstance(w, dict)], data)
+
+
+def _turned_ranges(wheels: list[Any], told: set[int | str]) -> Iterator[Problem]:
+    """Yield steering ranges that pydantic leaves out where a wheel has other mistakes.
+
+    What it has told itself is not told again.
+    """
+    for index, wheel in enumerate(wheels):
+        limits = wheel.get("steering_range_deg") if isinstance(wheel, dict) else None
+        if index in told or not isinstance(limits, list) or len(limits) != 2:
+            continue
+        if all(type(x) in (int, float) for x in limits) and limits[0] >= limits[1]:
+            where = f"wheels[{index}].steering_range_deg"
+            allowed = "the first angle must be less than the second"
+            yield Problem(where, _shorten(limits), allowed)
 
 
 def _conflicts(wheels: list[dict[Any, Any]], data: dict[Any, Any]) -> Iterator[Problem]:
@@ -246,6 +268,15 @@ def _problem(error: ErrorDetails) -> Problem:
             return Problem(where, "unknown key", _suggestion(error))
         case "missing":
             return Problem(where, "missing", "must be given")
+        case "too_short" if where == "wheels":
+            return Problem(where, "none", "at least one is needed")
+        case "union_tag_invalid":
+            kind = given.get("type") if isinstance(given, dict) else given
+            allowed = f"one of {', '.join(_WHEELS)}"
+            return Problem(f"{where}.type", _shorten(kind), allowed)
+        case "union_tag_not_found":
+            allowed = f"must be given: one of {', '.join(_WHEELS)}"
+            return Problem(f"{where}.type", "missing", allowed)
         case "steering_range":
             head, _, rest = error["msg"].partition(": ")
             prefix = f"{where}." if where else ""

@@ -161,7 +161,7 @@ def _collect(codes: Array, words: Array, count: int, open_: Array) -> int:
     # Beyond the end may be codes of the part before.
     while waiting > 0 and open_[waiting - 1] >= count:
         waiting -= 1
-    return waiting
+    return int(waiting)
 
 
 @njit(cache=True)

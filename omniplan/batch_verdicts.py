@@ -84,10 +84,10 @@ def _describe(
 
 @njit(cache=True, inline="always")
 def _settled(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
-    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
-    pieces: int, by_piece: Array,
+    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
+    vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
+    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
+    place: Array, ends: Array, pieces: int, by_piece: Array,
 ) -> bool:  # fmt: skip
     """Decide every row that holds for both representations, and each by pieces.
 
@@ -106,8 +106,9 @@ def _settled(
         if broken:
             continue
         low[r], high[r], is_clear = refine(
-            blocks, knot_of, count, knots, is_pose, rows, r, vehicle, tolerances,
-            s, highs, skipped, halves, stack, knot_at, NO, count, KEPT, PROVING, NO, place[r],
+            blocks, knot_of, count, knots, is_pose, rows, r, vehicle, tolerances, s,
+            highs, skipped, halves, stack, knot_at, NO, count, KEPT, PROVING, NO,
+            place[r],
         )  # fmt: skip
         if low[r] > KEPT:
             broken = True
@@ -126,8 +127,8 @@ def _settled(
             else:
                 reached, most, is_clear = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0], ends[p, 1], KEPT,
-                    PROVING, YES, place[r],
+                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0],
+                    ends[p, 1], KEPT, PROVING, YES, place[r],
                 )  # fmt: skip
             if not is_clear and not broken:
                 return False
@@ -149,8 +150,8 @@ def _judge(
     `out` gets the margin, then time, value and bound of the row that refuses.
     """
     (
-        s, tops, wanted, done, most, highs, skipped, halves, low, high, at, place, stack,
-        knot_at, ends, by_piece, signs,
+        s, tops, wanted, done, most, highs, skipped, halves, low, high, at, place,
+        stack, knot_at, ends, by_piece, signs,
     ) = room  # fmt: skip
     n_rows = rows.shape[0]
     pieces = 1
@@ -165,8 +166,8 @@ def _judge(
     )  # fmt: skip
     place[:n_rows, 0] = -1.0
     if not _settled(
-        blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s,
-        highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces, by_piece,
+        blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s, highs,
+        skipped, halves, stack, knot_at, low, high, place, ends, pieces, by_piece,
     ):  # fmt: skip
         return UNCLEAR, -1
     if vehicle[3] > 0 and not choose(
@@ -182,13 +183,14 @@ def _judge(
             is_valid = False
     if is_valid:
         which = _margin(
-            blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s,
-            highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces, signs, out,
+            blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s, highs,
+            skipped, halves, stack, knot_at, low, high, place, ends, pieces, signs, out,
         )  # fmt: skip
         return VALID, which
     verdict: tuple[int, int] = _refusal(
         blocks, knot_of, count, knots, is_pose, rows, order, vehicle, tolerances, s,
-        highs, skipped, halves, stack, knot_at, low, at, place, ends, pieces, signs, out,
+        highs, skipped, halves, stack, knot_at, low, at, place, ends, pieces, signs,
+        out,
     )  # fmt: skip
     return verdict
 
@@ -201,10 +203,10 @@ def _is_driven(sign: float, pieces: int, signs: Array, steers: bool, p: int) -> 
 
 @njit(cache=True, inline="always")
 def _margin(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
-    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array, place: Array, ends: Array,
-    pieces: int, signs: Array, out: Array,
+    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
+    vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
+    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
+    place: Array, ends: Array, pieces: int, signs: Array, out: Array,
 ) -> int:  # fmt: skip
     """Write the margin of a valid pair, sharpened; return the row it belongs to."""
     worst, steers = 0.0, vehicle[3] > 0
@@ -224,8 +226,8 @@ def _margin(
                 first, last = (NO, count) if sign == 0 else (ends[p, 0], ends[p, 1])
                 reached, most, _ = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, skipped, halves, stack, knot_at, first, last, limit,
-                    SHARPENING, NO, place[r],
+                    tolerances, s, highs, skipped, halves, stack, knot_at, first, last,
+                    limit, SHARPENING, NO, place[r],
                 )  # fmt: skip
                 worst = max(worst, reached)
             if most > largest:
@@ -236,10 +238,11 @@ def _margin(
 
 @njit(cache=True, inline="always")
 def _refusal(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
-    rows: Array, order: Array, vehicle: Array, tolerances: Array, s: Array,
-    highs: Array, skipped: Array, halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, at: Array, place: Array,
-    ends: Array, pieces: int, signs: Array, out: Array,
+    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
+    order: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array,
+    skipped: Array, halves: tuple[Array, Array], stack: Array, knot_at: Array,
+    low: Array, at: Array, place: Array, ends: Array, pieces: int, signs: Array,
+    out: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Write what refuses a pair and the margin; return the verdict and the row."""
     steers = vehicle[3] > 0
@@ -254,8 +257,8 @@ def _refusal(
             if sign != 0 and (pieces > 1 or low[r] > KEPT):
                 reached, _, _ = refine(
                     blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0], ends[p, 1],
-                    np.inf, NO, YES, place[r],
+                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0],
+                    ends[p, 1], np.inf, NO, YES, place[r],
                 )  # fmt: skip
             worst = max(worst, reached)
             if reached <= KEPT:
@@ -337,9 +340,9 @@ def judge_pairs(
         for v in range(bodies.shape[0]):
             a, b = first_row[v], first_row[v + 1]
             status[n, v], which[n, v] = _judge(
-                blocks[first[n] : first[n + 1]], of_motion,
-                knot_of[first[n] : first[n + 1]], count[n], knots, is_pose[n], rows[a:b], order[a:b], bodies[v],
-                tolerances, room, numbers[n, v],
+                blocks[first[n] : first[n + 1]], of_motion, knot_of[first[n]
+                : first[n + 1]], count[n], knots, is_pose[n], rows[a:b], order[a:b],
+                bodies[v], tolerances, room, numbers[n, v],
             )  # fmt: skip
             if which[n, v] >= 0:
                 which[n, v] += a

@@ -7,12 +7,14 @@ counts, as other work only makes things slower.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -24,7 +26,7 @@ from configspace import Grid, PermissibleSpace, build_space, load_vehicle
 from omniplan.batch import Batch, check_twists
 from omniplan.bench_cases import KINDS, random_trajectories, random_vehicles
 
-__all__ = ["Size", "bench", "bench_table"]
+__all__ = ["QUICK", "Size", "bench", "bench_table"]
 
 FloatArray = npt.NDArray[np.float32]
 
@@ -45,6 +47,14 @@ class Size:
     trajectories: int = 1000
     samples: int = 100
     """Per trajectory."""
+    repeats: int = REPEATS
+
+
+QUICK = Size(twists=8_000_000, loops=2_000, vehicles=100, trajectories=100, repeats=2)
+"""Arrays as large as they have to be, but few repetitions."""
+CACHE_SIZE = "/sys/devices/system/cpu/cpu0/cache/index3/size"
+USUAL_CACHE = 32 << 20
+"""Bytes, where the system does not tell."""
 
 
 def bench(size: Size | None = None) -> dict[str, Any]:
@@ -55,19 +65,29 @@ def bench(size: Size | None = None) -> dict[str, Any]:
     size : Size, optional
     """
     size = size or Size()
+    size = replace(size, twists=max(size.twists, _beyond_cache()))
     rng = np.random.default_rng(1)
-    triad = _triad_rate(rng, size.twists)
-    lookups = [_lookup(rng, name, size.twists, triad) for name in LOOKUPS]
+    many = _many(rng, size)  # first: the peak of memory is told right after it
+    triad = _triad_rate(rng, size)
     return {
         "machine": _machine(),
         "triad": {"elements_per_s": triad, "elements": size.twists},
-        "check_twists": lookups,
+        "check_twists": [_lookup(rng, name, size, triad) for name in LOOKUPS],
         "wpilib": _against_wpilib(rng, size),
-        "validate_many": _many(rng, size),
+        "validate_many": many,
     }
 
 
-def _best(task: Callable[[], object], repeats: int = REPEATS) -> float:
+def _beyond_cache() -> int:
+    """Return so many elements that no array of a triad stays in the cache."""
+    cache = USUAL_CACHE
+    with contextlib.suppress(OSError, ValueError):
+        text = Path(CACHE_SIZE).read_text(encoding="ascii").strip()
+        cache = int(text.removesuffix("K")) << 10
+    return cache // np.dtype(np.float32).itemsize
+
+
+def _best(task: Callable[[], object], repeats: int) -> float:
     """Return the least time of a task, s, after one run that does not count."""
     task()
     times = []
@@ -84,11 +104,12 @@ def _triad(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> None:
         a[i] = b[i] + c[i] * d[i]
 
 
-def _triad_rate(rng: np.random.Generator, count: int) -> float:
+def _triad_rate(rng: np.random.Generator, size: Size) -> float:
     """Return the elements per second of ``a = b + c * d`` in float32."""
+    count = size.twists
     a = np.zeros(count, np.float32)
     b, c, d = (rng.random(count, dtype=np.float32) for _ in range(3))
-    return count / _best(lambda: _triad(a, b, c, d))
+    return count / _best(lambda: _triad(a, b, c, d), size.repeats)
 
 
 def _twists(
@@ -107,11 +128,12 @@ def _twists(
 
 
 def _lookup(
-    rng: np.random.Generator, name: str, count: int, triad: float
+    rng: np.random.Generator, name: str, size: Size, triad: float
 ) -> dict[str, Any]:
     space = build_space(load_vehicle(name))
-    twists = _twists(rng, space, count)
-    rate = count / _best(lambda: check_twists(twists, space))
+    twists = _twists(rng, space, size.twists)
+    seconds = _best(lambda: check_twists(twists, space), size.repeats)
+    rate = size.twists / seconds
     return {
         "vehicle": name,
         "samples_per_s": rate,
@@ -144,8 +166,8 @@ def _against_wpilib(rng: np.random.Generator, size: Size) -> dict[str, Any]:
             answers.append(speeds.frontLeft == before)
         return answers
 
-    theirs = size.loops / _best(loop, 3)
-    ours = size.twists / _best(lambda: check_twists(twists, space))
+    theirs = size.loops / _best(loop, min(size.repeats, 3))
+    ours = size.twists / _best(lambda: check_twists(twists, space), size.repeats)
     return {
         "library": f"{LIBRARY} {metadata.version(LIBRARY)}",
         "loop_per_s": theirs,
@@ -172,6 +194,7 @@ def _many(rng: np.random.Generator, size: Size) -> dict[str, Any]:
         "checks": batch.pairs * size.samples,
         "kinds": list(KINDS),
         "seconds": seconds,
+        "peak_memory": _peak_memory(),
         "valid": valid / batch.pairs,
         "asked": batch.asked / batch.pairs,
     }
@@ -180,6 +203,16 @@ def _many(rng: np.random.Generator, size: Size) -> dict[str, Any]:
 def _count_valid(batch: Batch) -> Iterator[int]:
     for rows in batch.verdicts():
         yield int(np.count_nonzero(rows["valid"].to_numpy(zero_copy_only=False)))
+
+
+def _peak_memory() -> int | None:
+    """Return the most memory this process has held so far, bytes; None on Windows."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    unit = 1 if platform.system() == "Darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
 def _machine() -> dict[str, Any]:
@@ -229,11 +262,13 @@ def bench_table(found: dict[str, Any]) -> Any:
         text = f"{wpilib['ratio']:.0f} times a loop of {wpilib['loop_per_s']:.3g} /s"
         table.add_row(f"check_twists against {wpilib['library']}", text, "300")
     many = found["validate_many"]
+    peak = many["peak_memory"]
+    memory = "" if peak is None else f"; {peak / 2**20:.0f} MiB at most"
     table.add_row(
         f"{many['vehicles']} vehicles x {many['trajectories']} trajectories x "
         f"{many['samples']} samples",
         f"{many['seconds']:.2f} s; {many['valid']:.0%} valid, validate asked for "
-        f"{many['asked']:.2%}",
+        f"{many['asked']:.2%}{memory}",
         "3 s for 1e8",
     )
     return table

@@ -90,20 +90,25 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     inspect = command("inspect", _inspect, "show what a vehicle can do")
-    inspect.add_argument("vehicle", help="catalogue name or vehicle file")
+    inspect.add_argument("vehicle", help="catalogue name, vehicle file or data sheet")
     inspect.add_argument("--plot", type=Path, metavar="DIR", help="draw its space")
 
-    check = command("check", _check, "judge trajectories for one vehicle")
+    check = command("check", _check, "judge trajectories for one vehicle or for many")
     _trajectory_arguments(check)
     who = check.add_mutually_exclusive_group(required=True)
     who.add_argument("--vehicle", help="catalogue name, vehicle file or data sheet")
     who.add_argument(
-        "--fleet", nargs="+", metavar="VEHICLE", help="several; needs --out"
+        "--fleet",
+        nargs="+",
+        metavar="VEHICLE",
+        help="several, after the trajectories; needs --out",
     )
     check.add_argument(
         "--out", type=Path, metavar="FILE.parquet", help="for a fleet: the verdicts"
     )
-    check.add_argument("--plot", type=Path, metavar="DIR", help="draw the trajectories")
+    check.add_argument(
+        "--plot", type=Path, metavar="DIR", help="for one: draw the trajectories"
+    )
 
     select = command("select", _select, "rank the vehicles of a fleet")
     _trajectory_arguments(select, "*")
@@ -111,7 +116,8 @@ def _parser() -> argparse.ArgumentParser:
         "--fleet",
         nargs="+",
         metavar="[NAME=]VEHICLE",
-        help="default: the whole catalogue; names tell vehicles of one type apart",
+        help="after the trajectories; default: the whole catalogue; names tell "
+        "vehicles of one type apart",
     )
     _ranking_arguments(select)
 
@@ -153,7 +159,7 @@ def _parser() -> argparse.ArgumentParser:
     _certificate_arguments(query)
 
     export = command("export", _export, "write a vehicle's data sheet or its solid")
-    export.add_argument("vehicle", help="catalogue name or vehicle file")
+    export.add_argument("vehicle", help="catalogue name, vehicle file or data sheet")
     export.add_argument(
         "output", type=Path, help="FILE.safetensors, or FILE.glb, .stl, .ply for a mesh"
     )
@@ -290,6 +296,11 @@ def _check(options: argparse.Namespace) -> int:
             Problem("check", "one of --fleet and --out", "both or none of them")
         )
     if options.fleet is not None:
+        _require_table(options.out)
+        if options.plot is not None:
+            raise InvalidInput(
+                Problem("check", "--plot with --fleet", "needs --vehicle")
+            )
         return _check_fleet(options)
     space = _space(options.vehicle)
     motions = _motions(options.trajectories, options.parameters_of)
@@ -316,6 +327,16 @@ def _check(options: argparse.Namespace) -> int:
             ):
                 _say(f"wrote {path}", options.json)
     return _answer_timed(timings, reports, options.json)
+
+
+def _require_table(path: Path) -> None:
+    """Raise before the work is done if its result cannot be written."""
+    from configspace import InvalidInput, Problem
+
+    if path.suffix.lower() != ".parquet":
+        raise InvalidInput(Problem("--out", str(path), "must end in .parquet"))
+    if not path.parent.is_dir():
+        raise InvalidInput(Problem("--out", str(path), "the folder must exist"))
 
 
 def _check_fleet(options: argparse.Namespace) -> int:
@@ -353,7 +374,8 @@ def _select(options: argparse.Namespace) -> int:
     asked = requirements_of(options.require)
     if not options.trajectories and not asked:
         given = "no trajectory and no --require"
-        raise InvalidInput(Problem("select", given, "at least one is needed"))
+        allowed = "at least one is needed; trajectories stand before --fleet"
+        raise InvalidInput(Problem("select", given, allowed))
     motions = _motions(options.trajectories, options.parameters_of)
     console = _progress_console()
     fleet = _named_fleet(options.fleet, console)
@@ -366,7 +388,13 @@ def _select(options: argparse.Namespace) -> int:
         requirements=asked,
         allow_unreachable=options.allow_unreachable,
     )
-    progress = track(motions, "Judging", console=console, transient=True)
+    progress = track(
+        motions,
+        "Judging",
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
     return _answer_rankings([ranked(one) for one in progress], options.json)
 
 
@@ -548,7 +576,10 @@ def _export(options: argparse.Namespace) -> int:
         from configspace.mesh import export
 
         export(space.to_mesh(), options.output)
-    _say(f"wrote {options.output}", options.json)
+    if options.json:
+        _print_json({"output": str(options.output)})
+    else:
+        print(f"wrote {options.output}")
     return YES
 
 
@@ -568,12 +599,11 @@ def _schema(options: argparse.Namespace) -> int:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    from omniplan.bench import Size, bench, bench_table
+    from omniplan.bench import QUICK, bench, bench_table
 
-    small = Size(200_000, 2_000, 100, 100)
     console = _progress_console()
     with console.status("Measuring; takes a minute or two"):
-        found = bench(small if options.quick else Size())
+        found = bench(QUICK if options.quick else None)
     if options.json:
         _print_json(found)
     else:
@@ -590,8 +620,17 @@ def _catalog(options: argparse.Namespace) -> int:
 
 def _space(name: str) -> PermissibleSpace:
     """Return the space of a catalogue name, a vehicle file or a data sheet."""
-    from configspace import build_space, load_space, load_vehicle
+    from configspace import (
+        InvalidInput,
+        Problem,
+        build_space,
+        load_space,
+        load_vehicle,
+    )
 
+    if name.endswith((".csv", ".parquet")):
+        allowed = "a vehicle is needed here; trajectories stand before --fleet"
+        raise InvalidInput(Problem("vehicle", name, allowed))
     if name.endswith(".safetensors"):
         return load_space(name)
     return build_space(load_vehicle(name))
@@ -605,7 +644,13 @@ def _fleet(names: Sequence[str] | None, console: Console) -> list[PermissibleSpa
     chosen = names or catalog()
     return [
         _space(name)
-        for name in track(chosen, "Loading spaces", console=console, transient=True)
+        for name in track(
+            chosen,
+            "Loading spaces",
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
     ]
 
 

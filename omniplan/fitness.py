@@ -24,6 +24,7 @@ from configspace import (
     exact_v_max,
     from_twist,
 )
+from configspace.space import require_space
 from omniplan.requirements import (
     WAYS,
     Crab,
@@ -65,6 +66,7 @@ class FleetVehicle:
     """kg; None: as its vehicle file says."""
 
     def __post_init__(self) -> None:
+        require_space(self.space, f"fleet: {self.id}")
         if not 0 < len(self.id) <= 200:
             allowed = "a text of 1 to 200 characters"
             raise InvalidInput(Problem("fleet: id", repr(self.id)[:60], allowed))
@@ -150,6 +152,8 @@ def suitable(
 
 def fleet_of(fleet: Iterable[FleetEntry]) -> tuple[FleetVehicle, ...]:
     """Return the vehicles of a fleet; InvalidInput if it is empty or names repeat."""
+    if isinstance(fleet, PermissibleSpace):
+        raise InvalidInput(Problem("fleet", "one PermissibleSpace", "a list of them"))
     vehicles = tuple(map(_fleet_vehicle, fleet))
     if not vehicles:
         raise InvalidInput(Problem("fleet", "empty", "at least one vehicle"))
@@ -165,7 +169,11 @@ def fleet_of(fleet: Iterable[FleetEntry]) -> tuple[FleetVehicle, ...]:
 def _fleet_vehicle(entry: FleetEntry) -> FleetVehicle:
     if isinstance(entry, PermissibleSpace):
         return FleetVehicle(entry.name, entry)
-    return FleetVehicle(*entry) if isinstance(entry, tuple) else entry
+    if isinstance(entry, tuple):
+        return FleetVehicle(*entry)
+    if not isinstance(entry, FleetVehicle):
+        require_space(entry, "fleet")
+    return entry
 
 
 def requirements_of(

@@ -25,7 +25,7 @@ from omniplan.requirements import NoMirroring, PassableBackwards, Requirement
 from omniplan.shortfalls import Shortfall, Unfit
 from omniplan.timing import time_paths
 from omniplan.trace import Proved, prove
-from omniplan.trajectory import Trajectory
+from omniplan.trajectory import Trajectory, require_motion
 from omniplan.validation import validate
 
 __all__ = ["Criterion", "FleetVehicle", "ranked_by", "select", "time_for"]
@@ -97,7 +97,10 @@ def select(
     ranked = ranked_by(
         fleet, by, requirements=requirements, allow_unreachable=allow_unreachable
     )
-    return tuple(map(ranked, trajectories))
+    motions = tuple(trajectories)
+    for i, motion in enumerate(motions):
+        require_motion(motion, f"trajectories[{i}]")
+    return tuple(map(ranked, motions))
 
 
 def ranked_by(

@@ -125,7 +125,8 @@ def inspection_table(name: str, facts: dict[str, Any]) -> Table:
         ("… in components", f"{facts['components']}"),
         ("… not connected with straight on", f"{facts['unreachable_share']:.2%}"),
         ("configurations blocked", f"{facts['blocked_share']:.2%}"),
-        ("manoeuvrability index", _index_text(facts["manoeuvrability"])),
+        ("… in cells that a border cuts", f"{facts['mixed_share']:.2%}"),
+        ("manoeuvrability index", _index_text(facts)),
         ("v_max straight ahead", f"{facts['speed_ahead']:.3f} m/s"),
         ("v_max straight back", f"{facts['speed_backwards']:.3f} m/s"),
         ("v_max sideways", f"{facts['speed_sideways']:.3f} m/s"),
@@ -144,9 +145,15 @@ def inspection_table(name: str, facts: dict[str, Any]) -> Table:
     return table
 
 
-def _index_text(index: dict[str, Any]) -> str:
+def _index_text(facts: dict[str, Any]) -> str:
     """Return both shares, from below, and what they are shares of."""
-    of = "all motions" if index["dimension"] == 2 else "the motions along its line"
+    index = facts["manoeuvrability"]
+    if index["dimension"] == 2:
+        of = "all motions"
+    elif facts["line_beta"] is None:
+        of = "the motions without turning"
+    else:
+        of = "the motions along its line"
     return (
         f"{index['share']:.2%} of {of}\n"
         f"{index['speed_share']:.2%} weighted by speed, {index['v_ref']:.3f} m/s is 1"

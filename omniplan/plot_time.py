@@ -195,6 +195,7 @@ def _draw_margin(axes: Axes, drive: Drive) -> None:
     lowest = int(drive.trace.margin.argmin())
     wheel = drive.trace.wheel[lowest]
     name = drive.trace.limit[lowest].lower().replace("_", " ")
+    name = name.replace("steer ", "steering ")
     text = f"least: {name}" + (f" of {plain(wheel, 24)}" if wheel else "")
     axes.set_title(text, loc="right", fontsize="small", pad=2)
     low = min(-5.0, 100 * float(margin.min()) - 5)

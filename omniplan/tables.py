@@ -83,8 +83,8 @@ def show_suitability(suitability: Suitability, console: Console) -> None:
     console : Console
     """
     if suitability.suitable:
-        table = Table(title="meets all requirements", title_justify="left")
-        table.add_column("vehicle", no_wrap=True)
+        table = Table()
+        table.add_column("meets all requirements", no_wrap=True)
         for name in suitability.suitable:
             table.add_row(escape(name))
         console.print(table)

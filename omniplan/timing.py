@@ -15,6 +15,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace.space import require_space
 from omniplan.path import Path
 from omniplan.path_motion import path_of, pieces_of
 from omniplan.rows import Tolerances
@@ -125,9 +126,10 @@ def time_paths(
     timings : tuple of Timing
         In the order of the paths.
     """
+    require_space(space)
     if space.vehicle is None:
         given = f"{space.name}: a data sheet alone"
-        allowed = "timing needs the vehicle: its rates are not in the data sheet"
+        allowed = "timing needs the vehicle: a data sheet does not hold all its rates"
         raise InvalidInput(Problem("space", given, allowed))
     for name, value, least in (("grid", grid, 2), ("steps", steps, 4)):
         if value < least:

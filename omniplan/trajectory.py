@@ -35,7 +35,7 @@ from omniplan.samples import (
     unwrapped,
 )
 
-__all__ = ["Trajectory", "timed"]
+__all__ = ["Trajectory", "require_motion", "timed"]
 
 FloatArray = npt.NDArray[np.float64]
 Form: TypeAlias = Literal["poses", "twists", "omni_curve"]
@@ -387,8 +387,9 @@ def timed(motion: Trajectory | Path) -> Trajectory:
     Raises
     ------
     InvalidTrajectory
-        For a path: only a motion with times can be judged.
+        For a path: only a motion with times can be judged. For anything else, too.
     """
+    require_motion(motion, "trajectory")
     if isinstance(motion, Path):
         raise InvalidTrajectory(
             Problem(
@@ -398,3 +399,10 @@ def timed(motion: Trajectory | Path) -> Trajectory:
             )
         )
     return motion
+
+
+def require_motion(given: object, where: str) -> None:
+    """Raise InvalidTrajectory unless a value is a trajectory or a path."""
+    if not isinstance(given, Trajectory | Path):
+        allowed = "a Trajectory or a Path, as read_trajectories returns"
+        raise InvalidTrajectory(Problem(where, repr(given)[:60], allowed))

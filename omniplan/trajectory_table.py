@@ -92,7 +92,7 @@ def header_of(source: str, names: Sequence[str]) -> Header:
         known & set(POINT) and forms[0] == "omni_curve"
     ):
         given = f"columns {', '.join(names)}"
-        allowed = "reference_x and reference_y, for poses or twists"
+        allowed = "reference_x and reference_y together, beside poses or twists"
     elif is_timed and known & set(PATH_ONLY):
         given = f"column {min(known & set(PATH_ONLY))} beside t"
         allowed = f"{', '.join(PATH_ONLY)}: for paths, which have no t"
@@ -182,9 +182,9 @@ def _built(
     if header.form == "twists":
         return Trajectory.from_twists(t, samples, name=name, reference_point=point)
     if vehicle is None:
-        raise InvalidTrajectory(
-            Problem(name, "kappa_n, beta, v_n of no vehicle", "name their vehicle")
-        )
+        allowed = "name it: vehicle=, --parameters-of"
+        problem = Problem(name, "kappa_n, beta, v_n of no vehicle", allowed)
+        raise InvalidTrajectory(problem)
     kappa_n, beta, v_n = samples.T
     return Trajectory.from_omni_curve(t, kappa_n, beta, v_n, vehicle, name=name)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from configspace import PermissibleSpace
 from configspace.omni_curve import curvature_of_ratio
+from configspace.space import require_space
 from configspace.vehicle import SteerableWheel
 from omniplan.chords import Chord
 from omniplan.judge import is_own, judge_for
@@ -92,6 +93,7 @@ def validate(
     >>> omniplan.validate(line, space).valid
     True
     """
+    require_space(space)
     ask = partial(
         judged,
         space=space,
@@ -243,7 +245,7 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
     """Yield the declared limits that this version does not judge."""
     vehicle = space.vehicle
     if vehicle is None:
-        yield "change rates (not in the data sheet)"
+        yield "change rates (the data sheet does not hold all of them)"
         return
     steered = [w for w in vehicle.wheels if isinstance(w, SteerableWheel)]
     swings = any(w.max_steering_acceleration_deg is not None for w in steered)

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 Rng: TypeAlias = np.random.Generator
+Column: TypeAlias = "pa.Array[Any]"
 
 DEEP = 3000
 """Levels of nesting: more than any reader of JSON takes."""
@@ -24,7 +25,15 @@ VALUES: list[Any] = [
 KEYS = ["", "name", "t", "poses", "twists", "omni_curve", "vehicle", "vehicles", "by"]
 KEYS += ["request", "deadline", "__class__", "$ref", "wheels", "limits", "x\u0000"]
 LITERALS = [b"NaN", b"-Infinity", b"1e999", b"-", b"[", b"{", b'"', b",", b"\\u", b"01"]
-LITERALS += [b"\x00", b"\xff", b"\xed\xa0\x80", b"\xef\xbb\xbf", b"/*", b"'", b"9" * 400]
+LITERALS += [
+    b"\x00",
+    b"\xff",
+    b"\xed\xa0\x80",
+    b"\xef\xbb\xbf",
+    b"/*",
+    b"'",
+    b"9" * 400,
+]
 
 
 def choose(rng: Rng, things: list[Any]) -> Any:
@@ -102,7 +111,7 @@ def other_text(rng: Rng, text: bytes) -> bytes:
     at = int(rng.integers(len(text) + 1))
     match int(rng.integers(6)):
         case 0:
-            return text[:at] + choose(rng, LITERALS) + text[at:]
+            return text[:at] + bytes(choose(rng, LITERALS)) + text[at:]
         case 1 if text.startswith(b"{") and len(text) > 2:
             # The last of two equal keys wins, for us as for Python.
             return b"{" + text[1:].split(b":")[0] + b": 3, " + text[1:]
@@ -115,7 +124,7 @@ def other_text(rng: Rng, text: bytes) -> bytes:
         case 4:
             return b" \n" * int(rng.integers(500)) + text + b"\t"
         case _:
-            return text + choose(rng, [b"x", b"{}", text, b"\x00"])
+            return text + bytes(choose(rng, [b"x", b"{}", text, b"\x00"]))
 
 
 def other_json(rng: Rng, data: Any) -> bytes:
@@ -156,25 +165,27 @@ def _other_lengths(rng: Rng, stream: bytes) -> bytes:
     return bytes(data)
 
 
-def _cast(rng: Rng, column: pa.Array) -> pa.Array:
+def _cast(rng: Rng, column: Column) -> Column:
     kinds = [pa.float16(), pa.float32(), pa.int8(), pa.uint64(), pa.string()]
     kinds += [pa.bool_(), pa.binary(), pa.large_string(), pa.date32(), pa.null()]
     kinds += [pa.decimal128(9, 2), pa.list_(pa.float64()), pa.duration("s")]
     kind = choose(rng, kinds)
     try:
-        return column.cast(kind)
+        cast: Column = column.cast(kind)
     except pa.ArrowException:
-        return pa.nulls(len(column), kind)
+        cast = pa.nulls(len(column), kind)
+    return cast
 
 
-def _with_value(rng: Rng, column: pa.Array, value: object) -> pa.Array:
+def _with_value(rng: Rng, column: Column, value: object) -> Column:
     values = column.to_pylist()
     if values:
         values[int(rng.integers(len(values)))] = value
     try:
-        return pa.array(values, column.type)
+        changed: Column = pa.array(values, column.type)
     except (pa.ArrowException, OverflowError, TypeError):
         return column
+    return changed
 
 
 def other_table(rng: Rng, table: pa.Table) -> pa.Table:
@@ -200,7 +211,7 @@ def other_table(rng: Rng, table: pa.Table) -> pa.Table:
                 start, n = (int(k) for k in rng.integers(0, table.num_rows + 1, 2))
                 table = table.slice(start, n)
             case 6:
-                table = table.take(pa.array(rng.permutation(table.num_rows)))
+                table = table.take(rng.permutation(table.num_rows))
             case _:
                 values = [None, float("nan"), float("inf"), -1e300, 0.0, 3.5, "other"]
                 changed = _with_value(rng, column, choose(rng, values))

@@ -71,7 +71,9 @@ def ahead_then_sideways(rest: float) -> Trajectory:
     return Trajectory.from_poses(t, np.concatenate(poses))
 
 
-@pytest.mark.parametrize("rate_deg", [None, 400.0, 30.0])
+@pytest.mark.parametrize(
+    "rate_deg", [None, pytest.param(400.0, marks=pytest.mark.slow), 30.0]
+)
 @pytest.mark.parametrize(
     ("wheel", "rolled"),
     [

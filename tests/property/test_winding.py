@@ -278,7 +278,9 @@ def test_a_motion_with_stops_and_both_representations_is_never_wrongly_valid(
 
 
 @pytest.mark.parametrize("swing_deg", [None, 50.0])
-@pytest.mark.parametrize("rate_deg", [None, 4000.0, 20.0])
+@pytest.mark.parametrize(
+    "rate_deg", [None, pytest.param(4000.0, marks=pytest.mark.slow), 20.0]
+)
 @pytest.mark.parametrize(
     ("wheel", "rolled"),
     [

@@ -164,6 +164,7 @@ def test_parts_come_before_the_whole_is_done(
 ) -> None:
     parts = client.verdicts(many[1:4])
     assert next(parts).num_rows == 2
+    assert held.entered.acquire(timeout=30)
     assert held.n_parts == 1
     held.opened.set()
     assert sum(rows.num_rows for rows in parts) == 4

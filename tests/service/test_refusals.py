@@ -231,7 +231,7 @@ def test_an_unknown_criterion_is_not_even_sent(
     client: Client, server: Server, trajectories: Sequence[omniplan.Trajectory]
 ) -> None:
     before = server.health().requests
-    with pytest.raises(InvalidMessage, match="by: 'beauty'; .*or 'manoeuvrability'"):
+    with pytest.raises(InvalidMessage, match=r"by: 'beauty'; .*or 'manoeuvrability'"):
         client.select(trajectories, by="beauty")
     assert server.health().requests == before
 

@@ -19,9 +19,7 @@ def test_a_minute_of_mixed_load_while_a_server_is_killed(tmp_path: Path) -> None
     command = [sys.executable, str(SCRIPT), "--minutes", "1", "--kill-every", "10"]
     # A file: nobody reads a pipe while it runs.
     with (tmp_path / "out").open("w+") as out, (tmp_path / "err").open("w+") as err:
-        run = subprocess.run(
-            command, stdout=out, stderr=err, timeout=580, check=False
-        )
+        run = subprocess.run(command, stdout=out, stderr=err, timeout=580, check=False)
         out.seek(0)
         err.seek(0)
         said, errors = out.read(), err.read()

@@ -77,7 +77,7 @@ def test_files_of_spreadsheets_are_read(tmp_path: Path, start: str, end: str) ->
         ("t,x,y,theta\n0,0,0,0\n1,nan,0,0\n", "row 1, x: nan"),
         ("t,x,y,theta\n0,0,0,0\n0,1,0,0\n", "row 1, t"),
         ("trajectory,t,x,y,theta\na,0,0,0,0\nb,0,0,0,0\n", "at least two"),
-        ("t,kappa_n,beta,v_n\n0,0,0,0\n1,0,0,0\n", "name their vehicle"),
+        ("t,kappa_n,beta,v_n\n0,0,0,0\n1,0,0,0\n", "name it: vehicle="),
         (bytes(range(256)), "UTF-8"),
         (b"\x00" * 100, "header"),
         ("t,x,y,theta\n0,0,0," + "1" * 200_000 + "\n", "line 2"),

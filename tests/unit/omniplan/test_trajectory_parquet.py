@@ -138,7 +138,7 @@ def test_omni_curve_files_are_of_the_vehicle_that_is_named(tmp_path: FilePath) -
     back = timed(*read_trajectories(path, vehicle))
     assert back.vehicle == vehicle
     assert (back.samples == own.samples).all()
-    with pytest.raises(InvalidTrajectory, match="name their vehicle"):
+    with pytest.raises(InvalidTrajectory, match="name it: vehicle="):
         read_trajectories(path)
 
 

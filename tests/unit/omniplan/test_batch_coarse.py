@@ -1,0 +1,124 @@
+"""The bounds of groups are held against what the rows say of single parts."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import configspace
+from omniplan import Tolerances, Trajectory
+from omniplan.batch_chords import HIGH, LOW, ROOM
+from omniplan.batch_coarse import GROUP, SCRATCH, groups_of, screen
+from omniplan.batch_fleet import Fleet, fleet_of
+from omniplan.batch_motions import LANES, Motions, motions_of
+from omniplan.batch_refine import KEPT, NO, YES, load, one_row
+from omniplan.batch_rows import BOUND, KIND, RANGE, RANGE_ERROR
+from omniplan.bench_cases import KINDS, random_trajectories, random_vehicles
+
+FloatArray = npt.NDArray[np.float64]
+
+TOLERANCES = Tolerances()
+LIMITS = np.array(
+    [TOLERANCES.standstill, math.sin(TOLERANCES.slip_angle), TOLERANCES.slip_speed]
+)
+
+
+def waves_at(t: FloatArray) -> FloatArray:
+    phase = np.array([0.0, 1.0, 2.0])
+    return np.sin(np.outer(t, [1.0, 0.7, 1.3]) + phase) * np.array([0.8, 0.3, 0.6])
+
+
+def trajectories() -> list[Trajectory]:
+    rng = np.random.default_rng(3)
+    t = np.linspace(0, 5, 60)
+    waves = waves_at(t)
+    twists = Trajectory.from_twists(t, waves, name="twists")
+    return [*random_trajectories(rng, 8, samples=60), twists]
+
+
+def fleet() -> Fleet:
+    rng = np.random.default_rng(4)
+    names = ("bmw-320i", "synchro-drive", "rover-mirrored-stops", "tricycle")
+    vehicles = [configspace.load_vehicle(name) for name in names]
+    return fleet_of([*random_vehicles(rng, len(KINDS)), *vehicles], TOLERANCES)
+
+
+def bounds_of(
+    motions: Motions, n: int, rows: FloatArray, vehicle: FloatArray
+) -> FloatArray:
+    """(r, groups) upper bounds."""
+    groups, first = groups_of(motions)
+    mine = groups[first[n] : first[n + 1]]
+    out = np.empty((len(rows), LANES * len(mine)))
+    screen(mine, rows, vehicle, LIMITS, np.empty((SCRATCH, LANES)), out)
+    return out[:, : (motions.first[n + 1] - motions.first[n]) * LANES // GROUP]
+
+
+def parts_of(
+    motions: Motions, n: int, rows: FloatArray, vehicle: FloatArray, exact: Any
+) -> tuple[FloatArray, FloatArray]:
+    """(r, parts) what is reached and what is never exceeded, part by part."""
+    blocks = motions.blocks[motions.first[n] : motions.first[n + 1]]
+    low, high = np.empty((2, len(rows), len(blocks) * LANES))
+    room = np.zeros(ROOM)
+    for b in range(len(blocks)):
+        at = slice(b * LANES, (b + 1) * LANES)
+        for r in range(len(rows)):
+            load(blocks, b, room)
+            one_row_alone(room, rows, r, vehicle, exact)
+            low[r, at] = room[LOW : LOW + LANES]
+            high[r, at] = room[HIGH : HIGH + LANES]
+    return low, high
+
+
+def one_row_alone(
+    room: FloatArray, rows: FloatArray, r: int, vehicle: FloatArray, exact: Any
+) -> None:
+    one_row(room, rows, r, vehicle, LIMITS, exact)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_bounds_of_groups_are_never_exceeded_and_often_of_use() -> None:
+    motions, vehicles = motions_of(trajectories()), fleet()
+    useful, seen = [], set()
+    for n in range(len(motions.count)):
+        for v, body in enumerate(vehicles.bodies):
+            rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
+            top = np.repeat(bounds_of(motions, n, rows, body), GROUP, axis=1)
+            low, high = parts_of(motions, n, rows, body, NO)
+            error = np.where(rows[:, KIND] == RANGE, RANGE_ERROR / np.maximum(
+                rows[:, BOUND], 1e-3), 0.0)  # fmt: skip
+            assert (low <= top * (1 + 1e-9) + error[:, None]).all()
+            counting = low[(rows[:, KIND] != RANGE)].max(initial=0.0)
+            useful.append(np.mean(top <= min(counting, KEPT)))
+            seen |= set(rows[:, KIND].astype(int))
+            # What is never exceeded may be less sharp, part by part, but not by much.
+            assert np.isfinite(high).any()
+    assert len(seen) >= 12
+    assert np.mean(useful) > 0.3
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_bounds_of_groups_hold_between_the_ends_of_parts() -> None:
+    """The same motion, sampled 8 times as finely, reaches no more."""
+    t = np.linspace(0, 6, 31)
+    waves = waves_at(t)
+    coarse = Trajectory.from_twists(t, waves, name="coarse")
+    fine_t = np.linspace(0, 6, 30 * 8 + 1)
+    fine_waves = np.stack([np.interp(fine_t, t, wave) for wave in waves.T], axis=-1)
+    fine = Trajectory.from_twists(fine_t, fine_waves, name="fine")
+    motions, vehicles = motions_of([coarse, fine]), fleet()
+    ends = [
+        motions.blocks[a:b].transpose(1, 0, 2).reshape(motions.blocks.shape[1], -1)[16]
+        for a, b in zip(motions.first, motions.first[1:], strict=False)
+    ]
+    group = np.minimum(
+        np.searchsorted(ends[0], ends[1] - 1e-9) // GROUP, len(ends[0]) // GROUP - 1
+    )
+    for v, body in enumerate(vehicles.bodies):
+        rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
+        top = bounds_of(motions, 0, rows, body)[:, group]
+        low, _ = parts_of(motions, 1, rows, body, YES)
+        assert (low <= top * (1 + 1e-9) + 1e-9).all()
