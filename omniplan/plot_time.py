@@ -197,6 +197,8 @@ def _draw_margin(axes: Axes, drive: Drive) -> None:
     name = drive.trace.limit[lowest].lower().replace("_", " ")
     name = name.replace("steer ", "steering ")
     text = f"least: {name}" + (f" of {plain(wheel, 24)}" if wheel else "")
+    if drive.trace.margin[lowest] < -1.0:  # cut off, or it would flatten the rest
+        text += f", {drive.trace.margin[lowest]:.0%}, cut off at -100%"
     axes.set_title(text, loc="right", fontsize="small", pad=2)
     low = min(-5.0, 100 * float(margin.min()) - 5)
     axes.set(ylabel="margin\n[%]", ylim=(low, 105))

