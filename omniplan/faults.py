@@ -28,8 +28,8 @@ class Fault:
         who = f"wheel {self.wheel}: " if self.wheel else ""
         x, y, theta = self.pose
         return (
-            f"{who}{self.text}, at x = {x:.2f} m, y = {y:.2f} m, "
-            f"θ = {math.degrees(theta):.0f}°, {self.u:.2f} m along the path "
+            f"{who}{self.text}, at x = {x:z.2f} m, y = {y:z.2f} m, "
+            f"θ = {math.degrees(theta):z.0f}°, {self.u:.2f} m along the path "
             f"[{self.limit}]"
         )
 

@@ -125,7 +125,7 @@ def _fault(
     wheel = judge.wheel_ids[row.wheel] if row.wheel >= 0 else None
     kappa_n, beta = _configuration(e, part, sign, judge, at_end=at_end)
     unproved = "" if is_proved else "cannot be excluded: "
-    where = f", κ_n = {kappa_n:+.3f}, β = {math.degrees(beta):+.1f}°"
+    where = f", κ_n = {kappa_n:+z.3f}, β = {math.degrees(beta):+z.1f}°"
     return Fault(row.limit, wheel, u, (x, y, theta), f"{unproved}{text}{where}")
 
 

@@ -80,12 +80,12 @@ def _place(violation: Violation) -> str:
     if violation.t_end - violation.t_start > 0.005:
         stretch += f" ({violation.t_start:.2f} to {violation.t_end:.2f} s)"
     where = (
-        f", κ_n = {violation.kappa_n:+.3f}, β = {math.degrees(violation.beta):+.1f}°"
+        f", κ_n = {violation.kappa_n:+z.3f}, β = {math.degrees(violation.beta):+z.1f}°"
     )
     pose = ""
     if violation.pose is not None:
         x, y, theta = violation.pose
-        pose = f", at x = {x:.2f} m, y = {y:.2f} m, θ = {math.degrees(theta):.0f}°"
+        pose = f", at x = {x:z.2f} m, y = {y:z.2f} m, θ = {math.degrees(theta):z.0f}°"
     return f"at {stretch}, row {violation.index}{pose}{where}"
 
 

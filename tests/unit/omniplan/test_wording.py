@@ -185,3 +185,13 @@ def test_more_than_one_violation_is_counted(space_of: SpaceOf) -> None:
     assert len(report.violations) == 2
     assert refusal(report).endswith("and 1 more")
     assert list(report_lines(report))[1].endswith("and 1 more of this kind")
+
+
+def test_rounded_zeros_have_no_minus() -> None:
+    space = configspace.build_space(configspace.load_vehicle("differential"))
+    poses = [[0.0, 0.0, 0.0], [3.0, -1e-6, -1e-6]]
+    line = Trajectory.from_poses([0.0, 1.0], poses)
+    report = validate(line, space)
+    assert report.violations
+    assert "y = 0.00 m, θ = 0°" in report.headline
+    assert not re.search(r"-0(\.0+)?[^.0-9]", report.headline)
