@@ -55,8 +55,6 @@ enabled = true
 store = "{store}"
 """
 TIMEOUT = 60.0  # s, for a question with all its attempts
-# A question that zenoh sends in the moment of the kill stays without any answer.
-ATTEMPT = 15.0
 PAUSE = 0.01  # s, between two questions of a thread
 SLACK = 48 * 2**20
 """What the server that lives on may have grown by, bytes."""
@@ -186,9 +184,7 @@ class Load:
             ("unregister", 1, self._unregister),
         ]
         weights = [weight for _, weight, _ in kinds]
-        with Client(
-            self._endpoints, timeout=TIMEOUT, attempt_timeout=ATTEMPT
-        ) as client:
+        with Client(self._endpoints, timeout=TIMEOUT) as client:
             while not is_over.is_set():
                 ((kind, _, ask),) = self._random.choices(kinds, weights)
                 self._ask(kind, ask, client)

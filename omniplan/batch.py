@@ -23,6 +23,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace.space import require_space
 from omniplan.batch_coarse import groups_of
 from omniplan.batch_fleet import Fleet, fleet_of, is_plain
 from omniplan.batch_motions import Motions, motions_of
@@ -154,6 +155,8 @@ class Batch:
 
     def __post_init__(self) -> None:
         require_names("trajectories", [_name(x) for x in self.trajectories])
+        for i, space in enumerate(self.spaces):
+            require_space(space, f"spaces[{i}]")
         require_names("spaces", [space.name for space in self.spaces])
 
     @property

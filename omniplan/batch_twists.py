@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace.space import require_space
 from omniplan.batch_lookup import CHUNK, check, check_parallel
 from omniplan.batch_settle import Sheet, sheet_of
 from omniplan.batch_surface import FLOAT32, Surface, surface_of
@@ -77,6 +78,7 @@ def check_twists(
     """
     rows = _rows(twists)
     tolerances = tolerances or Tolerances()
+    require_space(space)
     lookup = _LOOKUPS.get(space)
     if lookup is None:
         lookup = _LOOKUPS[space] = _derive(space)

@@ -252,6 +252,11 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
     if swings and not isinstance(motion, PoseMotion):
         yield "max_steering_acceleration_deg (samples other than poses bend suddenly)"
     if motion.has_rates:
+        if any(
+            w.max_acceleration is not None and (any(w.offsets) or w.steering_coupling)
+            for w in steered
+        ):
+            yield "max_acceleration of wheels, as far as steering asks for it"
         return
     if any(getattr(w, "max_acceleration", None) is not None for w in vehicle.wheels):
         yield "max_acceleration of the wheels"

@@ -197,6 +197,6 @@ class Source:
     def _wrong_encoding(self) -> Question:
         asked = self._validate() if self.rng.random() < 0.5 else self._batch_twists()
         payload = asked.payload
-        if self.rng.random() < 0.05:
+        if self.rng.random() < 0.2:
             payload = b" " * (MAX_BYTES + 1)
         return Question("ask", asked.key, payload, self._encoding())

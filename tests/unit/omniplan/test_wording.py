@@ -192,6 +192,6 @@ def test_rounded_zeros_have_no_minus() -> None:
     poses = [[0.0, 0.0, 0.0], [3.0, -1e-6, -1e-6]]
     line = Trajectory.from_poses([0.0, 1.0], poses)
     report = validate(line, space)
-    assert report.violations
-    assert "y = 0.00 m, θ = 0°" in report.headline
-    assert not re.search(r"-0(\.0+)?[^.0-9]", report.headline)
+    text = "\n".join(report_lines(report))
+    assert "y = 0.00 m, θ = 0°" in text
+    assert not re.search(r"-0(\.0+)?[^.0-9]", text)

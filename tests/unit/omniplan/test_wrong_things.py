@@ -32,6 +32,16 @@ CALLS: dict[str, tuple[Callable[[Any], Any], Any, str]] = {
     "fastest": (lambda x: omniplan.fastest(PATH, x), VEHICLE, "space: Vehicle; "),
     "time_paths": (lambda x: omniplan.time_paths([PATH], x), "a", "space: str; "),
     "build_space": (configspace.build_space, "mecanum", "vehicle: 'mecanum'; "),
+    "check_twists": (
+        lambda x: omniplan.check_twists([[0.1, 0.0, 0.0]], x),
+        VEHICLE,
+        "space: Vehicle; ",
+    ),
+    "validate_many": (
+        lambda x: omniplan.validate_many([LINE], [x]),
+        VEHICLE,
+        "spaces[0]: Vehicle; ",
+    ),
     "fleet": (lambda x: omniplan.select(LINE, x), [VEHICLE], "fleet: Vehicle; "),
     "pair": (lambda x: omniplan.select(LINE, x), [("a", 1)], "fleet: a: int; "),
     "trajectories": (
