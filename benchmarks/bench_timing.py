@@ -23,9 +23,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 import configspace
 from configspace import Vehicle
 from omniplan import Path, time_path
-from omniplan.path_motion import pieces_of
-from omniplan.timing_rows import FIRST_RATE, ONE_SIDED
-from omniplan.timing_solver import TimingProblem
+from omniplan.timing.path_motion import pieces_of
+from omniplan.timing.rows import FIRST_RATE, ONE_SIDED
+from omniplan.timing.solver import TimingProblem
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from rich.table import Table
 import configspace
 from configspace import Vehicle
 from configspace.spherical import spherical_to_omni_curve
-from omniplan.transitions import TransitionMap
+from omniplan.standing.transitions import TransitionMap
 
 D = 0.299082
 """Distance of the steering axes from K, m."""

@@ -8,22 +8,22 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from omniplan.batch import check_twists, validate_many
+    from omniplan.batch.many import check_twists, validate_many
+    from omniplan.choosing.faults import Fault, Undrivable
+    from omniplan.choosing.fitness import FleetVehicle, Suitability, suitable
+    from omniplan.choosing.fleet import select
+    from omniplan.choosing.requirements import parse_requirement
+    from omniplan.choosing.shortfalls import Shortfall, Unfit
     from omniplan.errors import InvalidTrajectory, NotDrivable
-    from omniplan.faults import Fault, Undrivable
-    from omniplan.fitness import FleetVehicle, Suitability, suitable
-    from omniplan.fleet import select
+    from omniplan.inputs.files import read_trajectories, write_trajectories
+    from omniplan.judging.rows import Tolerances
     from omniplan.path import Path
-    from omniplan.plot import plot_report
+    from omniplan.plots.pictures import plot_report
     from omniplan.report import Advice, Candidate, Ranking, Report, Violation
-    from omniplan.requirements import parse_requirement
-    from omniplan.rows import Tolerances
-    from omniplan.shortfalls import Shortfall, Unfit
-    from omniplan.timing import fastest, time_path, time_paths
-    from omniplan.timing_result import SpeedProfile, Timing, TimingStatus
+    from omniplan.timing.fastest import fastest, time_path, time_paths
+    from omniplan.timing.result import SpeedProfile, Timing, TimingStatus
     from omniplan.trace import Trace, margins
     from omniplan.trajectory import Trajectory
-    from omniplan.trajectory_io import read_trajectories, write_trajectories
     from omniplan.validation import validate
 
 __all__ = [

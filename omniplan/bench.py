@@ -23,7 +23,7 @@ import numpy.typing as npt
 from numba import njit, prange
 
 from configspace import Grid, PermissibleSpace, build_space, load_vehicle
-from omniplan.batch import Batch, check_twists
+from omniplan.batch.many import Batch, check_twists
 from omniplan.bench_cases import KINDS, random_trajectories, random_vehicles
 
 __all__ = ["QUICK", "Size", "bench", "bench_table"]

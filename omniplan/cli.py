@@ -16,20 +16,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from omniplan.shell import answers, loading
+from omniplan.shell.answers import BAD_INPUT, FAILURE, NO, YES
+
 if TYPE_CHECKING:
     from rich.console import Console
 
-    import omniplan.path
     from configspace import PermissibleSpace
-    from omniplan.fitness import Suitability
-    from omniplan.report import Ranking, Report
-    from omniplan.timing_result import Timing
-    from omniplan.trajectory import Trajectory
     from services import Client, Security, Server
 
 __all__ = ["main"]
 
-YES, NO, BAD_INPUT, FAILURE = 0, 1, 2, 3
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
@@ -245,8 +242,8 @@ def _demo(options: argparse.Namespace) -> int:
     from omniplan import demo
     from services import Client, Server
 
-    console = _console()
-    fleet = _fleet(demo.DEMO_FLEET, console)
+    console = answers.open_console()
+    fleet = loading.fleet_of(demo.DEMO_FLEET, console)
     trajectories = demo.manoeuvres()
     with (
         Server(fleet, site="demo", listen="tcp/127.0.0.1:0") as server,
@@ -255,14 +252,14 @@ def _demo(options: argparse.Namespace) -> int:
         rankings = client.select(trajectories, demo.DEMO_FLEET)
         endpoint = server.endpoint
     if options.json:
-        _print_json([ranking.to_dict() for ranking in rankings])
+        answers.print_json([ranking.to_dict() for ranking in rankings])
     else:
         console.print(
             f"{len(trajectories)} manoeuvres, {len(fleet)} vehicles, judged over zenoh "
             f"at {endpoint}\n"
         )
         demo.show(rankings, console)
-    pictures = demo.draw(rankings, options.output, _progress_console())
+    pictures = demo.draw(rankings, options.output, answers.progress_console())
     if not options.json:
         console.print(f"Pictures: {', '.join(str(path) for path in pictures)}")
     return YES
@@ -271,19 +268,19 @@ def _demo(options: argparse.Namespace) -> int:
 def _inspect(options: argparse.Namespace) -> int:
     from omniplan.inspection import inspect_space, inspection_table
 
-    space = _space(options.vehicle)
+    space = loading.space_of(options.vehicle)
     facts = inspect_space(space)
     if options.json:
-        _print_json(facts)
+        answers.print_json(facts)
     else:
-        _console().print(inspection_table(space.name, facts))
+        answers.open_console().print(inspection_table(space.name, facts))
     if options.plot is not None:
         from configspace.plot import plot_space, save_figure
 
         options.plot.mkdir(parents=True, exist_ok=True)
         path = options.plot / f"space-{space.name}.png"
         save_figure(plot_space(space), path)
-        _say(f"wrote {path}", options.json)
+        answers.say(f"wrote {path}", options.json)
     return YES
 
 
@@ -302,20 +299,23 @@ def _check(options: argparse.Namespace) -> int:
                 Problem("check", "--plot with --fleet", "needs --vehicle")
             )
         return _check_fleet(options)
-    space = _space(options.vehicle)
-    motions = _motions(options.trajectories, options.parameters_of)
-    timings = [_timing(motion, space, options.allow_unreachable) for motion in motions]
+    space = loading.space_of(options.vehicle)
+    motions = loading.motions_of(options.trajectories, options.parameters_of)
+    timings = [
+        loading.timing_of(motion, space, options.allow_unreachable)
+        for motion in motions
+    ]
     trajectories = [
         found
         for motion, timing in zip(motions, timings, strict=True)
-        if (found := _with_times(motion, timing)) is not None
+        if (found := loading.with_times(motion, timing)) is not None
     ]
     reports = [
         validate(trajectory, space, allow_unreachable=options.allow_unreachable)
         for trajectory in trajectories
     ]
     if options.plot is not None:
-        from omniplan.plot import plot_report
+        from omniplan.plots.pictures import plot_report
 
         for report, trajectory in zip(reports, trajectories, strict=True):
             for path in plot_report(
@@ -325,8 +325,8 @@ def _check(options: argparse.Namespace) -> int:
                 options.plot,
                 allow_unreachable=options.allow_unreachable,
             ):
-                _say(f"wrote {path}", options.json)
-    return _answer_timed(timings, reports, options.json)
+                answers.say(f"wrote {path}", options.json)
+    return answers.answer_timed(timings, reports, options.json)
 
 
 def _require_table(path: Path) -> None:
@@ -340,14 +340,14 @@ def _require_table(path: Path) -> None:
 
 
 def _check_fleet(options: argparse.Namespace) -> int:
-    from omniplan.batch import Batch
-    from omniplan.batch_files import write_verdicts
-    from omniplan.batch_paths import PathBatch
+    from omniplan.batch.files import write_verdicts
+    from omniplan.batch.many import Batch
+    from omniplan.batch.paths import PathBatch
     from omniplan.trajectory import Trajectory
 
-    motions = _motions(options.trajectories, options.parameters_of)
+    motions = loading.motions_of(options.trajectories, options.parameters_of)
     trajectories = [one for one in motions if isinstance(one, Trajectory)]
-    fleet = _fleet(options.fleet, _progress_console())
+    fleet = loading.fleet_of(options.fleet, answers.progress_console())
     allow = options.allow_unreachable
     batch: Batch | PathBatch
     if len(trajectories) == len(motions):
@@ -356,7 +356,7 @@ def _check_fleet(options: argparse.Namespace) -> int:
         batch = PathBatch(motions, fleet, allow_unreachable=allow)
     written = write_verdicts(options.out, batch, progress=True)
     if options.json:
-        _print_json({"output": str(options.out), **dataclasses.asdict(written)})
+        answers.print_json({"output": str(options.out), **dataclasses.asdict(written)})
     else:
         print(
             f"{written.valid} of {written.pairs} pairs are valid; wrote {options.out}"
@@ -368,20 +368,20 @@ def _select(options: argparse.Namespace) -> int:
     from rich.progress import track
 
     from configspace import InvalidInput, Problem
-    from omniplan.fitness import requirements_of, suitable
-    from omniplan.fleet import ranked_by
+    from omniplan.choosing.fitness import requirements_of, suitable
+    from omniplan.choosing.fleet import ranked_by
 
     asked = requirements_of(options.require)
     if not options.trajectories and not asked:
         given = "no trajectory and no --require"
         allowed = "at least one is needed; trajectories stand before --fleet"
         raise InvalidInput(Problem("select", given, allowed))
-    motions = _motions(options.trajectories, options.parameters_of)
-    console = _progress_console()
-    fleet = _named_fleet(options.fleet, console)
+    motions = loading.motions_of(options.trajectories, options.parameters_of)
+    console = answers.progress_console()
+    fleet = loading.named_fleet_of(options.fleet, console)
     if not options.trajectories:
         answer = suitable(fleet, asked, allow_unreachable=options.allow_unreachable)
-        return _answer_suitability(answer, options.json)
+        return answers.answer_suitability(answer, options.json)
     ranked = ranked_by(
         fleet,
         options.by,
@@ -395,7 +395,7 @@ def _select(options: argparse.Namespace) -> int:
         transient=True,
         disable=not console.is_terminal,
     )
-    return _answer_rankings([ranked(one) for one in progress], options.json)
+    return answers.answer_rankings([ranked(one) for one in progress], options.json)
 
 
 def _serve(options: argparse.Namespace) -> int:
@@ -412,8 +412,8 @@ def _serve(options: argparse.Namespace) -> int:
     logs.configure(config.log.level, config.log.format)
     # As if Ctrl-C were pressed: close() belongs to the main thread, not to a handler.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    fleet = _fleet_of_entries(config.fleet, _progress_console())
-    with _progress_console().status("Getting ready"):
+    fleet = _fleet_of_entries(config.fleet, answers.progress_console())
+    with answers.progress_console().status("Getting ready"):
         warm_up(fleet)
     with registry_of(config, fleet) as registry:
         server = server_of(config, registry)
@@ -431,7 +431,7 @@ def _serve(options: argparse.Namespace) -> int:
 def _say_serving(server: Server, as_json: bool) -> None:
     vehicles = server.vehicles
     if as_json:
-        _print_json({"endpoint": server.endpoint, "vehicles": vehicles})
+        answers.print_json({"endpoint": server.endpoint, "vehicles": vehicles})
     else:
         print(
             f"serving {len(vehicles)} vehicles at {server.endpoint}, "
@@ -448,9 +448,9 @@ def _fleet_of_entries(
 
     folders = [entry for entry in entries or () if Path(entry).is_dir()]
     if not folders:
-        return _fleet(entries, console)
+        return loading.fleet_of(entries, console)
     names = [entry for entry in entries or () if entry not in folders]
-    spaces = _fleet(names, console) if names else []
+    spaces = loading.fleet_of(names, console) if names else []
     return [*spaces, *(s for folder in folders for s in fleet_of_folder(folder))]
 
 
@@ -507,24 +507,24 @@ def _query(options: argparse.Namespace) -> int:
         security=_security(options),
     ) as client:
         if options.what == "health":
-            _print_json(client.health().model_dump())
+            answers.print_json(client.health().model_dump())
         elif options.what == "vehicles":
             names = client.vehicles()
-            _print_json(names) if options.json else print("\n".join(names))
+            answers.print_json(names) if options.json else print("\n".join(names))
         elif options.what == "sheet":
             client.space(options.vehicle).save(options.output)
-            _say(f"wrote {options.output}", options.json)
+            answers.say(f"wrote {options.output}", options.json)
         elif options.what == "check":
-            trajectories = _trajectories(options.trajectories, None)
+            trajectories = loading.trajectories_of(options.trajectories, None)
             allow = options.allow_unreachable
             reports = client.validate(
                 trajectories, options.vehicle, allow_unreachable=allow
             )
-            return _answer_reports(reports, options.json)
+            return answers.answer_reports(reports, options.json)
         elif options.what == "many":
             return _query_many(client, options)
         else:
-            trajectories = _trajectories(options.trajectories, None)
+            trajectories = loading.trajectories_of(options.trajectories, None)
             rankings = client.select(
                 trajectories,
                 options.fleet,
@@ -533,7 +533,7 @@ def _query(options: argparse.Namespace) -> int:
                 allow_unreachable=options.allow_unreachable,
                 online_only=options.online_only,
             )
-            return _answer_rankings(rankings, options.json)
+            return answers.answer_rankings(rankings, options.json)
     return YES
 
 
@@ -546,8 +546,8 @@ def _query_many(client: Client, options: argparse.Namespace) -> int:
 
     from configspace import OmniplanError
 
-    trajectories = _trajectories(options.trajectories, None)
-    with Progress(console=_progress_console(), transient=True) as bar:
+    trajectories = loading.trajectories_of(options.trajectories, None)
+    with Progress(console=answers.progress_console(), transient=True) as bar:
         task = bar.add_task("Judging", total=None)
         table = client.validate_many(
             trajectories,
@@ -562,14 +562,14 @@ def _query_many(client: Client, options: argparse.Namespace) -> int:
     valid = pc.sum(table["valid"]).as_py() or 0
     if options.json:
         found = {"output": str(options.output), "pairs": table.num_rows, "valid": valid}
-        _print_json(found)
+        answers.print_json(found)
     else:
         print(f"{valid} of {table.num_rows} pairs are valid; wrote {options.output}")
     return YES if valid == table.num_rows else NO
 
 
 def _export(options: argparse.Namespace) -> int:
-    space = _space(options.vehicle)
+    space = loading.space_of(options.vehicle)
     if options.output.suffix == ".safetensors":
         space.save(options.output)
     else:
@@ -577,7 +577,7 @@ def _export(options: argparse.Namespace) -> int:
 
         export(space.to_mesh(), options.output)
     if options.json:
-        _print_json({"output": str(options.output)})
+        answers.print_json({"output": str(options.output)})
     else:
         print(f"wrote {options.output}")
     return YES
@@ -590,201 +590,34 @@ def _schema(options: argparse.Namespace) -> int:
 
     schemas = {"service": service_schema, "vehicle": vehicle_schema}
     if options.what == "messages":
-        _print_json(list(MESSAGES)) if options.json else print("\n".join(MESSAGES))
+        answers.print_json(list(MESSAGES)) if options.json else print(
+            "\n".join(MESSAGES)
+        )
     elif options.what in schemas:
-        _print_json(schemas[options.what]())
+        answers.print_json(schemas[options.what]())
     else:
-        _print_json(message_schema(options.what))
+        answers.print_json(message_schema(options.what))
     return YES
 
 
 def _bench(options: argparse.Namespace) -> int:
     from omniplan.bench import QUICK, bench, bench_table
 
-    console = _progress_console()
+    console = answers.progress_console()
     with console.status("Measuring; takes a minute or two"):
         found = bench(QUICK if options.quick else None)
     if options.json:
-        _print_json(found)
+        answers.print_json(found)
     else:
-        _console().print(bench_table(found))
+        answers.open_console().print(bench_table(found))
     return YES
 
 
 def _catalog(options: argparse.Namespace) -> int:
     from configspace import catalog
 
-    _print_json(catalog()) if options.json else print("\n".join(catalog()))
+    answers.print_json(catalog()) if options.json else print("\n".join(catalog()))
     return YES
-
-
-def _space(name: str) -> PermissibleSpace:
-    """Return the space of a catalogue name, a vehicle file or a data sheet."""
-    from configspace import (
-        InvalidInput,
-        Problem,
-        build_space,
-        load_space,
-        load_vehicle,
-    )
-
-    if name.endswith((".csv", ".parquet")):
-        allowed = "a vehicle is needed here; trajectories stand before --fleet"
-        raise InvalidInput(Problem("vehicle", name, allowed))
-    if name.endswith(".safetensors"):
-        return load_space(name)
-    return build_space(load_vehicle(name))
-
-
-def _fleet(names: Sequence[str] | None, console: Console) -> list[PermissibleSpace]:
-    from rich.progress import track
-
-    from configspace import catalog
-
-    chosen = names or catalog()
-    return [
-        _space(name)
-        for name in track(
-            chosen,
-            "Loading spaces",
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-    ]
-
-
-def _named_fleet(
-    given: Sequence[str] | None, console: Console
-) -> list[tuple[str, PermissibleSpace]]:
-    """Return the fleet of ``[NAME=]VEHICLE`` texts, each vehicle loaded once."""
-    from configspace import catalog
-
-    pairs = [
-        ("", text) if Path(text).exists() else text.rpartition("=")[::2]
-        for text in given or catalog()
-    ]
-    files = list(dict.fromkeys(vehicle for _, vehicle in pairs))
-    spaces = dict(zip(files, _fleet(files, console), strict=True))
-    return [(name or spaces[file].name, spaces[file]) for name, file in pairs]
-
-
-def _trajectories(paths: Sequence[Path], parameters_of: str | None) -> list[Trajectory]:
-    from omniplan.trajectory import timed
-
-    return [timed(motion) for motion in _motions(paths, parameters_of)]
-
-
-def _motions(
-    paths: Sequence[Path], parameters_of: str | None
-) -> list[Trajectory | omniplan.path.Path]:
-    from configspace import load_vehicle
-    from omniplan.trajectory_io import read_trajectories
-
-    vehicle = load_vehicle(parameters_of) if parameters_of else None
-    return [motion for path in paths for motion in read_trajectories(path, vehicle)]
-
-
-def _timing(
-    motion: Trajectory | omniplan.path.Path,
-    space: PermissibleSpace,
-    allow_unreachable: bool,
-) -> Timing | None:
-    """Return the fastest timing of a path, None for what has times."""
-    from omniplan.trajectory import Trajectory
-
-    if isinstance(motion, Trajectory):
-        return None
-    from omniplan.timing import time_path
-
-    return time_path(motion, space, allow_unreachable=allow_unreachable)
-
-
-def _with_times(
-    motion: Trajectory | omniplan.path.Path, timing: Timing | None
-) -> Trajectory | None:
-    from omniplan.trajectory import Trajectory
-
-    if isinstance(motion, Trajectory):
-        return motion
-    return None if timing is None else timing.trajectory
-
-
-def _answer_timed(
-    timings: Sequence[Timing | None], reports: Sequence[Report], as_json: bool
-) -> int:
-    """Answer with a report for all that has times; paths also with their timing."""
-    from omniplan.wording import report_lines
-
-    judged, found = iter(reports), []
-    for timing in timings:
-        report = None
-        if timing is None or timing.trajectory is not None:
-            report = next(judged)
-        if not as_json:
-            if timing is not None:
-                print(f"timed: {timing.message}")
-            if report is not None:
-                print("\n".join(report_lines(report)))
-        data = {"valid": False} if report is None else report.to_dict()
-        found.append(data if timing is None else {**data, "timing": timing.to_dict()})
-    if as_json:
-        _print_json(found)
-    return YES if all(one["valid"] for one in found) else NO
-
-
-def _answer_reports(reports: Sequence[Report], as_json: bool) -> int:
-    from omniplan.wording import report_lines
-
-    if as_json:
-        _print_json([report.to_dict() for report in reports])
-    else:
-        for report in reports:
-            print("\n".join(report_lines(report)))
-    return YES if all(report.valid for report in reports) else NO
-
-
-def _answer_rankings(rankings: Sequence[Ranking], as_json: bool) -> int:
-    from omniplan.tables import show_ranking
-
-    if as_json:
-        _print_json([ranking.to_dict() for ranking in rankings])
-    else:
-        console = _console()
-        for ranking in rankings:
-            show_ranking(ranking, console)
-    return YES if all(ranking.best for ranking in rankings) else NO
-
-
-def _answer_suitability(answer: Suitability, as_json: bool) -> int:
-    from omniplan.tables import show_suitability
-
-    if as_json:
-        _print_json(answer.to_dict())
-    else:
-        show_suitability(answer, _console())
-    return YES if answer.suitable else NO
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    return Console()
-
-
-def _progress_console() -> Console:
-    from rich.console import Console
-
-    return Console(stderr=True)
-
-
-def _say(text: str, as_json: bool) -> None:
-    """Print a remark where it does not disturb JSON."""
-    print(text, file=sys.stderr if as_json else sys.stdout)
-
-
-def _print_json(data: object) -> None:
-    print(json.dumps(data, indent=2, allow_nan=False), flush=True)
 
 
 if __name__ == "__main__":

@@ -13,9 +13,9 @@ from rich.progress import track
 from rich.table import Table
 
 from configspace import PermissibleSpace, build_space, load_vehicle
+from omniplan.inputs.files import read_trajectories
 from omniplan.report import Ranking, Report
 from omniplan.trajectory import Trajectory, timed
-from omniplan.trajectory_io import read_trajectories
 from omniplan.wording import refusal
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _pictures(
     rankings: Sequence[Ranking],
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     from configspace.plot import plot_space
-    from omniplan.plot import plot_manoeuvres, plot_verdicts
+    from omniplan.plots.pictures import plot_manoeuvres, plot_verdicts
 
     spaces = [build_space(load_vehicle(name)) for name in DEMO_FLEET]
     for space in spaces:

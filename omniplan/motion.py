@@ -24,8 +24,8 @@ from scipy.interpolate import CubicSpline
 from configspace import Vehicle, exact_v_max
 from configspace.exact import active_rows
 from configspace.limits import rows_of
+from omniplan.judging.swing import Directions, Swing, directions_of_legs, factored
 from omniplan.samples import HEADING_LENGTH
-from omniplan.swing import Directions, Swing, directions_of_legs, factored
 from omniplan.trajectory import Trajectory
 
 __all__ = [

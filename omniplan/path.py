@@ -11,8 +11,8 @@ import numpy.typing as npt
 from configspace import Problem
 from configspace.angles import wrap
 from omniplan.errors import InvalidTrajectory
-from omniplan.nurbs import Nurbs
-from omniplan.route import Route, Tolerance
+from omniplan.inputs.nurbs import Nurbs
+from omniplan.inputs.route import Route, Tolerance
 from omniplan.samples import (
     HEADING_LENGTH,
     MAX_VALUE,

@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from omniplan.faults import Undrivable
-from omniplan.shortfalls import Unfit
+from omniplan.choosing.faults import Undrivable
+from omniplan.choosing.shortfalls import Unfit
 from omniplan.wording import describe
 
 __all__ = ["Advice", "Candidate", "Ranking", "Report", "Violation"]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from configspace import PermissibleSpace, exact_v_max
 from configspace.angles import wrap
 from configspace.omni_curve import components
-from omniplan.judge import is_own
+from omniplan.judging.judge import is_own
 from omniplan.motion import Intervals, motion_of
 from omniplan.report import Advice, Report, Violation
 from omniplan.trajectory import Trajectory

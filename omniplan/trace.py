@@ -15,11 +15,11 @@ import numpy.typing as npt
 from configspace import PermissibleSpace
 from configspace.angles import wrap
 from configspace.omni_curve import curvature_of_ratio
-from omniplan.judge import is_own, judge_for
+from omniplan.judging.judge import is_own, judge_for
+from omniplan.judging.proof import ROUNDING, Parts, Proof
+from omniplan.judging.rows import Judge, Tolerances
 from omniplan.motion import Intervals, Motion, motion_of
-from omniplan.proof import ROUNDING, Parts, Proof
-from omniplan.rows import Judge, Tolerances
-from omniplan.standstill import Choice, choose_configurations
+from omniplan.standing.standstill import Choice, choose_configurations
 from omniplan.trajectory import Trajectory
 from omniplan.validation import followed
 

@@ -18,22 +18,22 @@ from configspace import PermissibleSpace
 from configspace.omni_curve import curvature_of_ratio
 from configspace.space import require_space
 from configspace.vehicle import SteerableWheel
-from omniplan.chords import Chord
-from omniplan.judge import is_own, judge_for
-from omniplan.motion import Motion, PoseMotion, motion_of
-from omniplan.path import Path
-from omniplan.proof import Parts, Proof
-from omniplan.report import Advice, Report
-from omniplan.rows import Judge, Tolerances
-from omniplan.side_step import side_step
-from omniplan.standstill import Choice, choose_configurations
-from omniplan.trajectory import Trajectory, timed
-from omniplan.violations import (
+from omniplan.judging.chords import Chord
+from omniplan.judging.judge import is_own, judge_for
+from omniplan.judging.proof import Parts, Proof
+from omniplan.judging.rows import Judge, Tolerances
+from omniplan.judging.violations import (
     find_violations,
     reconfiguration_violations,
     unreachable_violations,
 )
-from omniplan.winding import straddling, wound
+from omniplan.motion import Motion, PoseMotion, motion_of
+from omniplan.path import Path
+from omniplan.report import Advice, Report
+from omniplan.side_step import side_step
+from omniplan.standing.standstill import Choice, choose_configurations
+from omniplan.standing.winding import straddling, wound
+from omniplan.trajectory import Trajectory, timed
 
 __all__ = ["Tolerances", "followed", "judged", "validate"]
 

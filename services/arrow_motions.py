@@ -13,15 +13,15 @@ from pyarrow import types
 from configspace.errors import InvalidInput, Problem
 from configspace.vehicle import Vehicle
 from omniplan import InvalidTrajectory
-from omniplan.path import Path
-from omniplan.trajectory import Trajectory, timed
-from omniplan.trajectory_table import (
+from omniplan.inputs.table import (
     Table,
     columns_of,
     each_of,
     header_of,
     span,
 )
+from omniplan.path import Path
+from omniplan.trajectory import Trajectory, timed
 from services.errors import InvalidMessage
 
 __all__ = [
@@ -43,7 +43,7 @@ _SOURCE = "trajectories"
 def table_of_trajectories(trajectories: Sequence[Trajectory | Path]) -> pa.Table:
     """Return trajectories of one form as one table in long form.
 
-    Columns as in Parquet files, see `omniplan.trajectory_table`; the vehicle of
+    Columns as in Parquet files, see `omniplan.inputs.table`; the vehicle of
     ``omni_curve`` trajectories is not among them.
 
     Raises

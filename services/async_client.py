@@ -15,8 +15,8 @@ import pyarrow as pa
 from configspace.errors import InvalidInput, Problem
 from configspace.space import PermissibleSpace
 from configspace.vehicle import Vehicle
+from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
-from omniplan.requirements import Requirement
 from omniplan.trajectory import Trajectory
 from services.batch_client import Progress
 from services.client import Client

@@ -12,8 +12,8 @@ import pyarrow as pa
 from configspace.space import PermissibleSpace
 from configspace.vehicle import Vehicle
 from configspace.vehicle_io import vehicle_from_data
-from omniplan.batch import Batch
-from omniplan.batch_twists import check_twists
+from omniplan.batch.many import Batch
+from omniplan.batch.twists import check_twists
 from omniplan.trajectory import Trajectory
 from services.answers import Answer, Parts
 from services.arrow import ARROW, parameters_of, read_table, write_table

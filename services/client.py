@@ -19,9 +19,9 @@ from configspace.space import PermissibleSpace
 from configspace.storage import parse_space
 from configspace.vehicle import Vehicle
 from configspace.vehicle_io import parse_vehicle
-from omniplan.batch import SCHEMA, require_names
+from omniplan.batch.many import SCHEMA, require_names
+from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
-from omniplan.requirements import Requirement
 from omniplan.trajectory import Trajectory, timed
 from services.arrow_motions import table_of_twists
 from services.asking import Asker

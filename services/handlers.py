@@ -12,7 +12,7 @@ from configspace.errors import InvalidInput, InvalidVehicle, Problem
 from configspace.space import PermissibleSpace
 from configspace.storage import dump_space
 from omniplan import InvalidTrajectory, validate
-from omniplan.fleet import ranked_by
+from omniplan.choosing.fleet import ranked_by
 from omniplan.report import Ranking
 from services.answers import Answer, Parts
 from services.arrow import ARROW

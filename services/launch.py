@@ -9,7 +9,7 @@ import numpy as np
 import configspace
 import omniplan
 from configspace.space import PermissibleSpace
-from omniplan.batch_lookup import CHUNK
+from omniplan.batch.lookup import CHUNK
 from services.config import ServiceConfig
 from services.registry import Registry
 from services.security import Roles, Security

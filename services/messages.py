@@ -15,10 +15,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails, from_json
 
 from configspace.errors import InvalidInput, Problem
-from omniplan.fitness import requirements_of
-from omniplan.fleet import Criterion
+from omniplan.choosing.fitness import requirements_of
+from omniplan.choosing.fleet import Criterion
+from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
-from omniplan.requirements import Requirement
 from omniplan.trajectory import Trajectory
 from services.errors import InvalidMessage
 
@@ -165,7 +165,7 @@ class SelectRequest(Question):
     by: Criterion = "duration"
     """What is best."""
     requirements: Annotated[Names, Field(max_length=100)] = ()
-    """What a vehicle must meet besides: phrases of `omniplan.requirements`."""
+    """What a vehicle must meet besides: phrases of `omniplan.choosing.requirements`."""
     allow_unreachable: bool = False
     """As for `omniplan.select`."""
     online_only: bool = False

@@ -15,7 +15,7 @@ from odd_requests import Question
 
 import configspace
 import omniplan
-from omniplan.batch import SCHEMA
+from omniplan.batch.many import SCHEMA
 from services.batch_messages import BatchPart
 from services.errors import CODES
 from services.messages import ErrorReply, SelectReply, ValidateReply, decode, encode

@@ -1,6 +1,6 @@
 """Timing a path the slow way: finite differences, scipy's linear programmes, loops.
 
-Shares with `omniplan.timing` the splines of a path and nothing else.
+Shares with `omniplan.timing.fastest` the splines of a path and nothing else.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from configspace import Vehicle
 from configspace.limits import GRAVITY
 from configspace.vehicle import Castor, FixedWheel, SteerableWheel
-from omniplan.path_motion import PathPiece
+from omniplan.timing.path_motion import PathPiece
 
 FloatArray = npt.NDArray[np.float64]
 Key = tuple[str, int]

@@ -16,7 +16,7 @@ import configspace
 from benchmarks.connette import RATE, SETS, care_o_bot, long_run
 from configspace.spherical import from_spherical, spherical_to_omni_curve
 from omniplan import Report, Trajectory, validate
-from omniplan.transitions import TransitionMap
+from omniplan.standing.transitions import TransitionMap
 
 D = 0.299082
 S0, S1, S2 = (0.0, 0.0), (0.2, math.pi / 4), (1.6, math.pi / 4)

@@ -17,9 +17,9 @@ from timing_cases import demanding_vehicle, smooth_path
 import configspace
 from configspace.testing import VehicleKind
 from omniplan import Path
-from omniplan.path_motion import PathPiece, pieces_of
-from omniplan.timing_rows import FIRST_RATE, ONE_SIDED
-from omniplan.timing_solver import TimingProblem
+from omniplan.timing.path_motion import PathPiece, pieces_of
+from omniplan.timing.rows import FIRST_RATE, ONE_SIDED
+from omniplan.timing.solver import TimingProblem
 
 FloatArray = npt.NDArray[np.float64]
 

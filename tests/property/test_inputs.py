@@ -27,10 +27,10 @@ from omniplan import (
     validate,
     write_trajectories,
 )
+from omniplan.inputs.nurbs import Nurbs
 from omniplan.motion import stops_of
-from omniplan.nurbs import Nurbs
 from omniplan.path import Path
-from omniplan.path_motion import pieces_of
+from omniplan.timing.path_motion import pieces_of
 from omniplan.trajectory import timed
 
 FloatArray = npt.NDArray[np.float64]

@@ -12,8 +12,8 @@ import configspace
 from configspace import Vehicle
 from configspace.testing import rigid_body, vehicles
 from omniplan import FleetVehicle
-from omniplan.fitness import shortfalls
-from omniplan.requirements import Crab, Radius, Speed, TurnOnTheSpot
+from omniplan.choosing.fitness import shortfalls
+from omniplan.choosing.requirements import Crab, Radius, Speed, TurnOnTheSpot
 
 Motion = Crab | Radius | Speed | TurnOnTheSpot
 CLEAR = 1e-6

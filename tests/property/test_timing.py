@@ -12,8 +12,8 @@ from timing_cases import demanding_vehicle, smooth_path
 from configspace import Grid, PermissibleSpace, build_space
 from configspace.testing import VehicleKind
 from omniplan import Path, Timing, TimingStatus, Trajectory, time_path, validate
-from omniplan.path_motion import path_of, pieces_of
-from omniplan.timing_solver import TimingProblem
+from omniplan.timing.path_motion import path_of, pieces_of
+from omniplan.timing.solver import TimingProblem
 
 KINDS: tuple[VehicleKind, ...] = ("mecanum", "omni", "steered", "offset", "turntable")
 ALL: tuple[VehicleKind, ...] = (

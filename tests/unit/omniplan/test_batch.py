@@ -15,16 +15,16 @@ from configspace import Grid, InvalidInput, PermissibleSpace, build_space
 from configspace.grid import edges_of
 from configspace.testing import ALL_KINDS, random_vehicle
 from omniplan import Tolerances, Trajectory, validate_many
-from omniplan.batch import SCHEMA, Batch
-from omniplan.batch_files import write_verdicts
-from omniplan.batch_fleet import fleet_of, is_plain
-from omniplan.batch_motions import FIELDS, motions_of
+from omniplan.batch.files import write_verdicts
+from omniplan.batch.fleet import fleet_of, is_plain
+from omniplan.batch.many import SCHEMA, Batch
+from omniplan.batch.motions import FIELDS, motions_of
 from omniplan.bench_cases import random_trajectories, random_vehicles
 from omniplan.cli import main
 from omniplan.demo import manoeuvres
+from omniplan.judging.vehicle_judge import VehicleJudge
 from omniplan.motion import Intervals, motion_of
 from omniplan.validation import judged
-from omniplan.vehicle_judge import VehicleJudge
 
 GRID = Grid(40, 72)
 NAMES = (
@@ -276,7 +276,7 @@ def test_vehicles_that_differ_in_their_names_only_are_judged_once() -> None:
 def test_chunks_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     trajectories, spaces = some_trajectories(6, 2), [space_of(n) for n in NAMES[:3]]
     whole = validate_many(trajectories, spaces).to_pylist()
-    monkeypatch.setattr(omniplan.batch, "CHUNK", 4)
+    monkeypatch.setattr(omniplan.batch.many, "CHUNK", 4)
     parts = list(Batch(trajectories, spaces).verdicts())
     assert len(parts) == len(trajectories)
     assert [row for part in parts for row in part.to_pylist()] == whole

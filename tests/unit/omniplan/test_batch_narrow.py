@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import configspace
 from configspace import Grid, build_space
 from configspace.testing import random_vehicle
-from omniplan.batch_narrow import ANGLE_ERROR, arc_tangent, narrow
-from omniplan.batch_settle import settle, sheet_of
+from omniplan.batch.narrow import ANGLE_ERROR, arc_tangent, narrow
+from omniplan.batch.settle import settle, sheet_of
 
 OPEN = 2
 sizes = st.floats(-1e3, 1e3).filter(lambda value: value == 0 or abs(value) > 1e-12)

@@ -13,7 +13,7 @@ import pytest
 import configspace
 from configspace import InvalidInput, PermissibleSpace
 from omniplan import Path, Trajectory, select, validate, validate_many
-from omniplan.batch_paths import PathBatch
+from omniplan.batch.paths import PathBatch
 from omniplan.cli import main
 
 SpaceOf = Callable[[str], PermissibleSpace]

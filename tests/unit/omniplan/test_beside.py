@@ -12,8 +12,8 @@ from configspace.limits import rows_of
 from configspace.omni_curve import POLE
 from configspace.testing import random_vehicle
 from omniplan import Tolerances, Trajectory, validate
+from omniplan.judging.vehicle_judge import VehicleJudge
 from omniplan.motion import Intervals, motion_of
-from omniplan.vehicle_judge import VehicleJudge
 
 
 def asked(vehicle: configspace.Vehicle, wheel: int, twist: np.ndarray) -> np.ndarray:

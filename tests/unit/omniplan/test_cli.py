@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from omniplan import cli
-from omniplan.requirements import PHRASES
+from omniplan.choosing.requirements import PHRASES
 
 MANOEUVRES = Path(__file__).parents[3] / "examples" / "manoeuvres"
 Capture = pytest.CaptureFixture[str]

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from omniplan import cli
+from omniplan.shell.answers import BAD_INPUT
 from services.config import ServiceConfig, load_config, variables
 
 FOLDER = Path(__file__).parents[3] / "examples" / "deploy"
@@ -40,7 +41,7 @@ def test_the_unit_is_well_formed(unit: dict[str, list[str]]) -> None:
     assert parser.sections() == ["Unit", "Service", "Install"]
     assert unit["DynamicUser"] == ["yes"]
     assert unit["NoNewPrivileges"] == ["yes"]
-    assert unit["RestartPreventExitStatus"] == [str(cli.BAD_INPUT)]
+    assert unit["RestartPreventExitStatus"] == [str(BAD_INPUT)]
 
 
 def test_the_units_command_line_is_taken(unit: dict[str, list[str]]) -> None:

@@ -7,8 +7,8 @@ import pytest
 import configspace
 from configspace import InvalidInput, PermissibleSpace
 from omniplan import FleetVehicle, Shortfall, suitable
-from omniplan.fitness import FleetEntry, fleet_of, requirements_of, shortfalls
-from omniplan.requirements import Crab, Payload, Radius, Speed, TurnOnTheSpot
+from omniplan.choosing.fitness import FleetEntry, fleet_of, requirements_of, shortfalls
+from omniplan.choosing.requirements import Crab, Payload, Radius, Speed, TurnOnTheSpot
 
 SpaceOf = Callable[[str], PermissibleSpace]
 

@@ -5,8 +5,8 @@ import pytest
 import configspace
 from configspace import InvalidInput, PermissibleSpace
 from omniplan import FleetVehicle, Ranking, Report, Trajectory, select
-from omniplan import fleet as fleet_module
-from omniplan.fitness import FleetEntry
+from omniplan.choosing import fleet as fleet_module
+from omniplan.choosing.fitness import FleetEntry
 from omniplan.validation import validate
 
 SpaceOf = Callable[[str], PermissibleSpace]

@@ -22,9 +22,9 @@ from omniplan import (
     time_paths,
     validate,
 )
-from omniplan import fleet as fleet_module
-from omniplan.fitness import FleetEntry
-from omniplan.plot_verdicts import verdict_text, verdicts
+from omniplan.choosing import fleet as fleet_module
+from omniplan.choosing.fitness import FleetEntry
+from omniplan.plots.verdicts import verdict_text, verdicts
 from omniplan.wording import ranking_lines
 
 SpaceOf = Callable[[str], PermissibleSpace]

@@ -10,7 +10,7 @@ import configspace
 from configspace import PermissibleSpace, exact_v_max
 from configspace.omni_curve import components
 from omniplan import Trajectory, select
-from omniplan.manoeuvrability import fleet_clearance, reserve
+from omniplan.choosing.manoeuvrability import fleet_clearance, reserve
 from omniplan.trace import prove
 
 SpaceOf = Callable[[str], PermissibleSpace]

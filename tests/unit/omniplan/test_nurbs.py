@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from omniplan import InvalidTrajectory
+from omniplan.inputs.nurbs import Nurbs, spans_of, uniform_knots
 from omniplan.motion import stops_of
-from omniplan.nurbs import Nurbs, spans_of, uniform_knots
 from omniplan.path import Path
 
 FloatArray = npt.NDArray[np.float64]

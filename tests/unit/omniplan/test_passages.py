@@ -6,8 +6,8 @@ import pytest
 import configspace
 from configspace import PermissibleSpace
 from omniplan import Trajectory, validate
-from omniplan.passages import backwards, passage_shortfalls
-from omniplan.requirements import NoMirroring, PassableBackwards
+from omniplan.choosing.passages import backwards, passage_shortfalls
+from omniplan.choosing.requirements import NoMirroring, PassableBackwards
 from omniplan.trace import prove
 
 

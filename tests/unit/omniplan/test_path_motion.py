@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omniplan import InvalidTrajectory, Path, Trajectory
-from omniplan.path_motion import PathMotion, path_of, pieces_of
+from omniplan.timing.path_motion import PathMotion, path_of, pieces_of
 
 
 def test_pieces_end_at_required_stops_cusps_and_corners() -> None:

@@ -9,16 +9,16 @@ import pytest
 
 from configspace import InvalidInput
 from configspace.plot import save_figure
-from omniplan.plot import (
+from omniplan.choosing.shortfalls import Shortfall, Unfit
+from omniplan.plots.pictures import (
     cusps,
     outlines_along,
     plot_manoeuvres,
     plot_trajectory,
     plot_verdicts,
 )
-from omniplan.plot_verdicts import verdict_text, verdicts
+from omniplan.plots.verdicts import verdict_text, verdicts
 from omniplan.report import Candidate, Ranking, Report, Violation
-from omniplan.shortfalls import Shortfall, Unfit
 from omniplan.trajectory import Trajectory
 
 FOOTPRINT = ((0.35, 0.2), (-0.35, 0.2), (-0.35, -0.2), (0.35, -0.2))

@@ -11,11 +11,11 @@ import pytest
 import configspace
 from configspace import InvalidInput, PermissibleSpace
 from omniplan import Trajectory, plot_report, read_trajectories, validate
-from omniplan.plot import plot_on_space, plot_times, plot_way
-from omniplan.plot_data import drive_of, marks_of, telling_wheels
-from omniplan.plot_map import joined
-from omniplan.plot_path import wheel_corners
-from omniplan.plot_style import BROKEN, MARGINS
+from omniplan.plots.data import drive_of, marks_of, telling_wheels
+from omniplan.plots.map import joined
+from omniplan.plots.path import wheel_corners
+from omniplan.plots.pictures import plot_on_space, plot_times, plot_way
+from omniplan.plots.style import BROKEN, MARGINS
 
 SpaceOf = Callable[[str], PermissibleSpace]
 MANOEUVRES = Path(__file__).parents[3] / "examples" / "manoeuvres"

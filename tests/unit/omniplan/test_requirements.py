@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from configspace import InvalidInput
-from omniplan.requirements import (
+from omniplan.choosing.requirements import (
     PHRASES,
     WAYS,
     Crab,

@@ -7,10 +7,10 @@ import pytest
 import configspace
 from configspace import Grid, PermissibleSpace, vehicle_from_data
 from omniplan import Report, Tolerances, Trajectory, validate
-from omniplan.judge import judge_for
+from omniplan.judging.judge import judge_for
+from omniplan.judging.proof import Proof
 from omniplan.motion import motion_of
-from omniplan.proof import Proof
-from omniplan.standstill import Choice, choose_configurations
+from omniplan.standing.standstill import Choice, choose_configurations
 
 SpaceOf = Callable[[str], PermissibleSpace]
 

@@ -11,9 +11,9 @@ import configspace
 from configspace import Grid, vehicle_from_data
 from configspace.testing import random_vehicle
 from omniplan import Tolerances, Trajectory, validate
+from omniplan.judging.swing import Swing
+from omniplan.judging.vehicle_judge import VehicleJudge
 from omniplan.motion import Intervals, OmniCurveMotion, PoseMotion, motion_of
-from omniplan.swing import Swing
-from omniplan.vehicle_judge import VehicleJudge
 
 FloatArray = npt.NDArray[np.float64]
 EVERYWHERE = (np.array([True]), np.array([True]))

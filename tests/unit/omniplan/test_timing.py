@@ -24,7 +24,7 @@ from omniplan import (
     time_paths,
     validate,
 )
-from omniplan.ways import Change, Changer, Configuration, Way
+from omniplan.standing.ways import Change, Changer, Configuration, Way
 
 SpaceOf = Callable[[str], PermissibleSpace]
 

@@ -11,10 +11,10 @@ import pytest
 from timing_cases import demanding_vehicle, smooth_path
 
 from configspace.testing import ALL_KINDS, VehicleKind
-from omniplan.path_motion import pieces_of
-from omniplan.timing_kernels import sweep
-from omniplan.timing_rows import FIRST_RATE
-from omniplan.timing_solver import TimingProblem
+from omniplan.timing.kernels import sweep
+from omniplan.timing.path_motion import pieces_of
+from omniplan.timing.rows import FIRST_RATE
+from omniplan.timing.solver import TimingProblem
 
 
 @pytest.mark.parametrize("kind", ALL_KINDS)

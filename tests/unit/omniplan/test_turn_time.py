@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omniplan.turn_time import Turning, paces_of, rest_to_rest, time_of
+from omniplan.standing.turn_time import Turning, paces_of, rest_to_rest, time_of
 
 FloatArray = npt.NDArray[np.float64]
 Function = Callable[[FloatArray], FloatArray]

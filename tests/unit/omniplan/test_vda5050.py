@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from omniplan import InvalidTrajectory, read_trajectories
+from omniplan.inputs.route import Tolerance
+from omniplan.inputs.vda5050 import path_of_order, read_orders
 from omniplan.path import Path
-from omniplan.route import Tolerance
-from omniplan.vda5050 import path_of_order, read_orders
 
 Json = dict[str, Any]
 HALF = math.sqrt(0.5)

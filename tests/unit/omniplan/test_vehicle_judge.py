@@ -10,10 +10,10 @@ from configspace import Vehicle
 from configspace.testing import random_vehicle
 from configspace.vehicle import SteeredWheel
 from omniplan import Tolerances, Trajectory
+from omniplan.judging.proof import Proof
+from omniplan.judging.rows import Row
+from omniplan.judging.vehicle_judge import VehicleJudge
 from omniplan.motion import Intervals, motion_of
-from omniplan.proof import Proof
-from omniplan.rows import Row
-from omniplan.vehicle_judge import VehicleJudge
 
 FAST = 0.05  # m/s: well above standstill
 

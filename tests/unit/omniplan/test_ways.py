@@ -10,10 +10,10 @@ from configspace import Grid, PermissibleSpace
 from configspace.angles import wrap
 from configspace.omni_curve import to_twist
 from omniplan import Tolerances, Trajectory, validate
-from omniplan.judge import judge_for
+from omniplan.judging.judge import judge_for
 from omniplan.motion import OmniCurveMotion
-from omniplan.searched_way import searched_legs, surface_of
-from omniplan.ways import Changer, Configuration, _ways
+from omniplan.standing.searched_way import searched_legs, surface_of
+from omniplan.standing.ways import Changer, Configuration, _ways
 
 START, GOAL = (0.5478, -1.4273), (-1.8361, -2.9975)
 """Two configurations of the paper's vehicle between which no simple way leads."""
@@ -94,7 +94,7 @@ def test_a_stop_between_them_is_permitted_given_the_time(
 def test_no_search_where_the_wheels_cannot_be_in_time(
     space: PermissibleSpace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from omniplan import ways
+    from omniplan.standing import ways
 
     def never(*_: object) -> None:
         raise AssertionError("searched")

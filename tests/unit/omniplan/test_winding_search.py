@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omniplan.rows import WindingWheel
-from omniplan.ways import Way
-from omniplan.winding import Sweep, joined
-from omniplan.winding_search import SHORT_REST, Track
+from omniplan.judging.rows import WindingWheel
+from omniplan.standing.ways import Way
+from omniplan.standing.winding import Sweep, joined
+from omniplan.standing.winding_search import SHORT_REST, Track
 
 TURN = 2 * math.pi
 RATE = 2.0

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from configspace import InvalidInput
+from omniplan.choosing.requirements import Crab
+from omniplan.choosing.shortfalls import Shortfall, Unfit
 from omniplan.report import Candidate, Ranking, Report, Violation
-from omniplan.requirements import Crab
-from omniplan.shortfalls import Shortfall, Unfit
 from omniplan.trajectory import Trajectory
 from services.errors import InvalidMessage
 from services.messages import (

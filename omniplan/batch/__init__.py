@@ -1,0 +1,1 @@
+"""Many twists and many pairs at once, in numba."""

@@ -1,0 +1,1 @@
+"""Which vehicle: ranking, requirements, reasons of refusal."""

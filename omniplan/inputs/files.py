@@ -1,0 +1,91 @@
+"""Reading and writing trajectories and paths: CSV, Parquet, VDA 5050 orders.
+
+The end of the file's name says which: ``.parquet``, ``.json`` (VDA 5050), else CSV.
+The columns are those of `omniplan.inputs.table`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path as FilePath
+
+from configspace import Problem, Vehicle
+from omniplan.errors import InvalidTrajectory
+from omniplan.inputs.table import columns_of, trajectories_of
+from omniplan.path import Path
+from omniplan.trajectory import Trajectory
+
+__all__ = ["read_trajectories", "write_trajectories"]
+
+
+def read_trajectories(
+    path: str | FilePath, vehicle: Vehicle | None = None
+) -> tuple[Trajectory | Path, ...]:
+    """Read trajectories or paths, in the order in which they first appear.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``.parquet`` file, a ``.json`` file with VDA 5050 orders, or a CSV file.
+    vehicle : Vehicle, optional
+        The vehicle whose parameters a file of ``kappa_n, beta, v_n`` holds.
+
+    Returns
+    -------
+    tuple of Trajectory or Path
+        Paths where the file has no times.
+
+    Raises
+    ------
+    InvalidTrajectory
+        If the file cannot be read or has mistakes; with the line, the row and column,
+        or the JSON path.
+    """
+    path = FilePath(path)
+    match path.suffix.lower():
+        case ".json":
+            from omniplan.inputs.vda5050 import read_orders
+
+            return read_orders(path)
+        case ".parquet":
+            from omniplan.inputs.parquet_files import read_parquet
+
+            return trajectories_of(read_parquet(path), vehicle)
+        case _:
+            from omniplan.inputs.csv_files import read_csv
+
+            return trajectories_of(read_csv(path), vehicle)
+
+
+def write_trajectories(
+    path: str | FilePath, trajectories: Iterable[Trajectory | Path]
+) -> None:
+    """Write trajectories of one form, or paths, to a Parquet or a CSV file.
+
+    Parquet keeps every digit; CSV keeps nine, and all of a time.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends in ``.parquet``, or is a CSV file.
+    trajectories : iterable of Trajectory or Path
+
+    Raises
+    ------
+    InvalidInput
+        If there are none, or their forms differ.
+    InvalidTrajectory
+        If the name of the file ends in ``.json``.
+    """
+    path = FilePath(path)
+    if path.suffix.lower() == ".json":
+        raise InvalidTrajectory(Problem(f"{path}", "JSON", ".csv or .parquet"))
+    table = columns_of(tuple(trajectories))
+    if path.suffix.lower() == ".parquet":
+        from omniplan.inputs.parquet_files import write_parquet
+
+        write_parquet(path, *table)
+    else:
+        from omniplan.inputs.csv_files import write_csv
+
+        write_csv(path, *table)

@@ -1,0 +1,1 @@
+"""Every limit between the samples: enclosures, judges, halving until decided."""

@@ -1,0 +1,198 @@
+"""Halving the parts of a motion until every limit is decided on every part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from omniplan.judging.chords import Chord, speed_of
+from omniplan.judging.rows import Judge, Row, Tolerances
+from omniplan.motion import Enclosure, Intervals, Motion
+
+__all__ = ["Parts", "Piece", "Proof", "refused"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+SignArray = npt.NDArray[np.int64]
+
+ROUNDING = 1e-12
+"""A limit counts as kept up to this relative excess: the rounding of float64."""
+RESOLUTION = 1e-6
+"""Parts are halved until low and high utilisation differ by less than this ..."""
+MAX_HALVINGS = 24
+"""... or this often ..."""
+MAX_PARTS = 100_000
+"""... or until there are this many; what is undecided then is refused."""
+SHARPNESS = 1e-3
+"""How sharply the worst utilisation is determined, relative ..."""
+SHARPENING_HALVINGS = 10
+"""... unless that takes more halvings than this."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What lies between two standstills: parts first to last."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The m parts of a motion and what is known about them."""
+
+    spans: Intervals
+    enclosure: Enclosure
+    stands: BoolArray
+    """(m,) whether the vehicle stands all over a part."""
+    low: dict[int, FloatArray]
+    """(m, rows) utilisation that is reached, per representation."""
+    high: dict[int, FloatArray]
+    """(m, rows) utilisation that is never exceeded."""
+    angles: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    """Followed steering angles at both ends, (m,) rad, by the row of the wheel's range;
+    of wheels that can wind on, once it is chosen how they start."""
+
+    def pieces(self) -> list[Piece]:
+        """Return the runs of parts on which the vehicle moves."""
+        moving = np.flatnonzero(~self.stands)
+        if not moving.size:
+            return []
+        breaks = np.flatnonzero(np.diff(moving) > 1)
+        firsts = moving[np.concatenate([[0], breaks + 1])]
+        lasts = moving[np.concatenate([breaks, [moving.size - 1]])]
+        return [Piece(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+
+    def picked(self, sign: SignArray) -> tuple[FloatArray, FloatArray]:
+        """Return low and high of the representation chosen for each part.
+
+        Parameters
+        ----------
+        sign : (m,) int, {-1, 1}
+        """
+        if len(self.low) == 1:
+            return self.low[1], self.high[1]
+        forward = (sign > 0)[:, None]
+        return (
+            np.where(forward, self.low[1], self.low[-1]),
+            np.where(forward, self.high[1], self.high[-1]),
+        )
+
+
+def refused(low: FloatArray, high: FloatArray, rows: Sequence[Row]) -> BoolArray:
+    """Return which limits are broken, or may be on parts that surely break none.
+
+    Parameters
+    ----------
+    low, high : (m, rows) float
+        Utilisations of the parts, decided.
+    rows : sequence of Row
+
+    Returns
+    -------
+    refused : (m, rows) bool
+    """
+    broken = low > 1 + ROUNDING
+    # Where one limit is surely broken the others were not pursued to the end.
+    open_ = (high > 1 + ROUNDING) & ~broken.any(axis=1, keepdims=True)
+    # With the centre of rotation on a wheel nothing more can be said of the wheel.
+    open_ &= np.isfinite(high) | np.array([row.bound == 0 for row in rows], dtype=bool)
+    return np.asarray(broken | open_, dtype=bool)
+
+
+class Proof:
+    """Parts of one motion under one judge, refined step by step."""
+
+    def __init__(self, motion: Motion, judge: Judge, tolerances: Tolerances) -> None:
+        self._motion, self._judge, self._tolerances = motion, judge, tolerances
+        self.is_own = motion.is_own
+        ambiguous = judge.needs_configuration and not motion.is_own
+        self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
+        self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
+        self._is_shape = np.array([row.scaling == "none" for row in judge.rows])
+        spans = motion.intervals()
+        self._step = spans.t1 - spans.t0
+        self.parts = self._evaluate(spans)
+
+    def _evaluate(self, spans: Intervals) -> Parts:
+        part = self._motion.enclose(spans)
+        body = Chord.of(part, self._judge.reference)
+        speed = speed_of(part, body, self._judge.kappa_g)[1] * part.scale_high
+        stands = (speed <= self._tolerances.standstill) & (not self._motion.is_own)
+        low, high = {}, {}
+        for sign in self.signs:
+            low[sign], high[sign] = self._judge.utilisation(part, sign)
+            # At rest the wheels may stand anyhow; how they turn is judged apart.
+            for bounds in (low[sign], high[sign]):
+                bounds[np.ix_(stands, self._free_at_rest)] = 0.0
+        return Parts(spans, part, stands, low, high)
+
+    def decide(self) -> None:
+        """Halve parts until every representation is proved or broken on them."""
+        self._halve(self._undecided, MAX_HALVINGS)
+
+    def _undecided(self, parts: Parts) -> BoolArray:
+        need = np.zeros(parts.stands.shape, dtype=bool)
+        for sign in self.signs:
+            low, high = parts.low[sign], parts.high[sign]
+            broken = low > 1 + ROUNDING
+            with np.errstate(invalid="ignore"):
+                is_open = (high > 1 + ROUNDING) & ~broken & (high - low > RESOLUTION)
+            # A part that breaks one limit is refused whatever the others say. But what
+            # slower driving mends must not hide what it does not: that decides which
+            # representation is driven.
+            need |= is_open.any(axis=1) & ~broken.any(axis=1)
+            shape_open = is_open[:, self._is_shape].any(axis=1)
+            need |= shape_open & ~broken[:, self._is_shape].any(axis=1)
+        return need
+
+    def sharpen(self, sign_of: Callable[[Intervals], SignArray]) -> None:
+        """Halve the parts that may hold the worst utilisation, until it is sharp.
+
+        Parameters
+        ----------
+        sign_of : callable
+            The representation chosen for each part.
+        """
+        scales = np.array([row.scaling != "none" for row in self._judge.rows])
+
+        def blunt(parts: Parts) -> BoolArray:
+            low, high = parts.picked(sign_of(parts.spans))
+            finite = np.isfinite(high) & np.isfinite(low)
+            low = np.where(finite, low, 0.0)
+            # What can be driven faster is compared among itself: it sets the factor.
+            worst = np.where(
+                scales,
+                low[:, scales].max(initial=0.05),
+                low[:, ~scales].max(initial=0.05),
+            )
+            return np.asarray((finite & (high > worst * (1 + SHARPNESS))).any(axis=1))
+
+        self._halve(blunt, SHARPENING_HALVINGS)
+
+    def refine(
+        self, wanted: Callable[[Parts], BoolArray], halvings: int = MAX_HALVINGS
+    ) -> None:
+        """Halve parts as long as they are wanted finer.
+
+        Parameters
+        ----------
+        wanted : callable
+            From parts to (m,) bool.
+        halvings : int
+            At most this often.
+        """
+        self._halve(wanted, halvings)
+
+    def _halve(self, wanted: Callable[[Parts], BoolArray], halvings: int) -> None:
+        smallest = self._step / 2**halvings
+        while True:
+            need = wanted(self.parts)
+            spans = self.parts.spans
+            need &= spans.t1 - spans.t0 > smallest[spans.knot]
+            if not need.any() or need.size + np.count_nonzero(need) > MAX_PARTS:
+                return
+            self.parts = self._evaluate(spans.halved(need))

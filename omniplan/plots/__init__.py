@@ -1,0 +1,1 @@
+"""The pictures; the only importers of matplotlib in this package."""

@@ -1,0 +1,115 @@
+"""What the command line prints, and the exit code that goes with it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from omniplan.choosing.fitness import Suitability
+    from omniplan.report import Ranking, Report
+    from omniplan.timing.result import Timing
+
+__all__ = [
+    "BAD_INPUT",
+    "FAILURE",
+    "NO",
+    "YES",
+    "answer_rankings",
+    "answer_reports",
+    "answer_suitability",
+    "answer_timed",
+    "open_console",
+    "print_json",
+    "progress_console",
+    "say",
+]
+
+YES, NO, BAD_INPUT, FAILURE = 0, 1, 2, 3
+
+
+def answer_timed(
+    timings: Sequence[Timing | None], reports: Sequence[Report], as_json: bool
+) -> int:
+    """Answer with a report for all that has times; paths also with their timing."""
+    from omniplan.wording import report_lines
+
+    judged, found = iter(reports), []
+    for timing in timings:
+        report = None
+        if timing is None or timing.trajectory is not None:
+            report = next(judged)
+        if not as_json:
+            if timing is not None:
+                print(f"timed: {timing.message}")
+            if report is not None:
+                print("\n".join(report_lines(report)))
+        data = {"valid": False} if report is None else report.to_dict()
+        found.append(data if timing is None else {**data, "timing": timing.to_dict()})
+    if as_json:
+        print_json(found)
+    return YES if all(one["valid"] for one in found) else NO
+
+
+def answer_reports(reports: Sequence[Report], as_json: bool) -> int:
+    """Answer with verdicts."""
+    from omniplan.wording import report_lines
+
+    if as_json:
+        print_json([report.to_dict() for report in reports])
+    else:
+        for report in reports:
+            print("\n".join(report_lines(report)))
+    return YES if all(report.valid for report in reports) else NO
+
+
+def answer_rankings(rankings: Sequence[Ranking], as_json: bool) -> int:
+    """Answer with rankings; yes if every trajectory has a vehicle."""
+    from omniplan.shell.tables import show_ranking
+
+    if as_json:
+        print_json([ranking.to_dict() for ranking in rankings])
+    else:
+        console = open_console()
+        for ranking in rankings:
+            show_ranking(ranking, console)
+    return YES if all(ranking.best for ranking in rankings) else NO
+
+
+def answer_suitability(answer: Suitability, as_json: bool) -> int:
+    """Answer with what meets the requirements."""
+    from omniplan.shell.tables import show_suitability
+
+    if as_json:
+        print_json(answer.to_dict())
+    else:
+        show_suitability(answer, open_console())
+    return YES if answer.suitable else NO
+
+
+def open_console() -> Console:
+    """Return a console for standard output."""
+    from rich.console import Console
+
+    return Console()
+
+
+def progress_console() -> Console:
+    """Return a console for progress bars, on standard error."""
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+def say(text: str, as_json: bool) -> None:
+    """Print a remark where it does not disturb JSON."""
+    print(text, file=sys.stderr if as_json else sys.stdout)
+
+
+def print_json(data: object) -> None:
+    """Print data as JSON."""
+    print(json.dumps(data, indent=2, allow_nan=False), flush=True)

@@ -1,0 +1,1 @@
+"""Standstills: representations, ways of the wheels and their time, full turns."""

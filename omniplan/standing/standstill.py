@@ -1,0 +1,359 @@
+"""Which of its two representations each piece of a motion is driven in.
+
+A piece is what lies between two standstills. Within it the configuration is continuous
+and v_s keeps its sign; at a standstill the wheels may be brought into another
+configuration, inside the space and in the time there is. Wheels that can wind on are
+followed throughout: how often each has turned at the start is chosen as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace import PermissibleSpace
+from configspace.omni_curve import curvature_of_ratio
+from omniplan.judging.proof import Parts, Piece, Proof, refused
+from omniplan.judging.rows import Judge, Tolerances
+from omniplan.motion import Intervals
+from omniplan.standing.reach import is_apart
+from omniplan.standing.ways import Change, Changer, Configuration, Way
+from omniplan.standing.winding import Anchor, Sweep, sweeps_of, unsettled
+from omniplan.standing.winding_search import SHORT_REST, Track
+
+__all__ = ["Apart", "Choice", "Reconfiguration", "Standstill", "choose_configurations"]
+
+UNREACHABLE = 0.75
+"""What a piece that is apart counts where a broken limit counts 1: of two refusals the
+one of a permitted configuration tells more."""
+MAX_LABELS = 8
+"""So many ways to have come to a piece are kept for each representation."""
+
+
+@dataclass(frozen=True)
+class Reconfiguration:
+    """Getting from one configuration to another at a standstill."""
+
+    start: Configuration
+    """(κ_n, β) before, 1 and rad."""
+    goal: Configuration
+    """(κ_n, β) after, 1 and rad."""
+    time: float
+    """Time it takes, s; infinite if no way inside the space was found."""
+    wheel: int
+    """The wheel that turns furthest or unwinds longest, -1 if unknown."""
+    turn: float
+    """By how much that wheel turns, full turns that it unwinds included, rad."""
+
+
+@dataclass(frozen=True)
+class Standstill:
+    """A stretch at rest between two pieces, and what happens there."""
+
+    t0: float
+    t1: float
+    change: Reconfiguration
+
+
+@dataclass(frozen=True)
+class Apart:
+    """A piece for sure in another component of the space than straight ahead."""
+
+    t0: float
+    t1: float
+    start: Configuration
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The representation of every piece."""
+
+    signs: tuple[int, ...]
+    standstills: tuple[Standstill, ...]
+    """Between consecutive pieces."""
+    anchors: tuple[Anchor, ...] = ()
+    """Where the winding wheels stand, one per piece; none if no wheel winds."""
+    apart: tuple[Apart, ...] = ()
+
+    def piece_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
+        """Return the piece of each part."""
+        cuts = [(stop.t0 + stop.t1) / 2 for stop in self.standstills]
+        return np.searchsorted(cuts, (spans.t0 + spans.t1) / 2)
+
+    def sign_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
+        """Return the representation of each part."""
+        return np.asarray(np.array(self.signs)[self.piece_of(spans)])
+
+
+@dataclass(frozen=True)
+class _Option:
+    """One piece in one representation."""
+
+    cost: float
+    """Number of limits that are broken."""
+    sweeps: tuple[Sweep, ...]
+
+
+@dataclass(frozen=True)
+class _Label:
+    """One way to have come to a piece."""
+
+    signs: tuple[int, ...]
+    ways: tuple[Way, ...]
+    cost: float
+    """Without that of the winding wheels."""
+    tracks: tuple[Track, ...]
+
+    @property
+    def total(self) -> float:
+        return self.cost + sum(track.least for track in self.tracks)
+
+    @property
+    def preference(self) -> tuple[float, tuple[int, ...]]:
+        """Order by cost; among equals driving forwards comes first."""
+        return self.total, tuple(-sign for sign in self.signs)
+
+    def is_no_better(self, other: _Label) -> bool:
+        """Return whether another label is as good, however it goes on."""
+        return other.cost <= self.cost and all(
+            bool((theirs.cost <= ours.cost).all())
+            for theirs, ours in zip(other.tracks, self.tracks, strict=True)
+        )
+
+
+def choose_configurations(
+    proof: Proof,
+    judge: Judge,
+    space: PermissibleSpace,
+    tolerances: Tolerances,
+    *,
+    allow_unreachable: bool = False,
+) -> Choice:
+    """Choose representations with the fewest violations, then the shortest waits.
+
+    Parameters
+    ----------
+    proof : Proof
+        Decided; refined until it is known how far wheels wind.
+    judge : Judge
+    space : PermissibleSpace
+    tolerances : Tolerances
+    allow_unreachable : bool
+        Whether pieces may lie in another component than straight ahead.
+    """
+    wheels = judge.winding_wheels
+    proof.refine(lambda parts: unsettled(parts, wheels))
+    parts, pieces = proof.parts, proof.parts.pieces()
+    if not pieces:
+        return Choice((1,), ())
+    lost = {
+        (i, sign): not allow_unreachable and is_apart(parts, piece, sign, judge, space)
+        for i, piece in enumerate(pieces)
+        for sign in proof.signs
+    }
+    if not judge.needs_configuration:
+        return Choice(
+            (1,), (), (), _apart(parts, pieces, [1] * len(pieces), judge, lost)
+        )
+    options = _options(proof, judge, pieces, lost, sweeps_of(parts, pieces, wheels))
+    changer = _Changes(parts, pieces, judge, Changer(judge, space, tolerances))
+    best = _best(options, changer, judge)
+    return Choice(
+        best.signs,
+        _standstills(best, changer, judge),
+        _anchors(best, parts, pieces) if wheels else (),
+        _apart(parts, pieces, best.signs, judge, lost),
+    )
+
+
+def _options(
+    proof: Proof,
+    judge: Judge,
+    pieces: Sequence[Piece],
+    lost: dict[tuple[int, int], bool],
+    sweeps: Sequence[tuple[Sweep, ...]],
+) -> list[dict[int, _Option]]:
+    """Return the representations of every piece that are worth a look.
+
+    Only the best of a piece can be part of the best sequence that is valid, and looking
+    for ways between configurations is dear.
+    """
+    parts, options = proof.parts, []
+    faults = {s: refused(parts.low[s], parts.high[s], judge.rows) for s in proof.signs}
+    for i, (piece, swept) in enumerate(zip(pieces, sweeps, strict=True)):
+        rows = slice(piece.first, piece.last + 1)
+        costs = {
+            sign: float(
+                faults[sign][rows].any(axis=0).sum() + lost[i, sign] * UNREACHABLE
+            )
+            for sign in proof.signs
+        }
+        least = min(costs.values())
+        turned = {1: swept, -1: tuple(sweep.opposite() for sweep in swept)}
+        options.append(
+            {s: _Option(cost, turned[s]) for s, cost in costs.items() if cost == least}
+        )
+    return options
+
+
+class _Changes:
+    """What may happen at the standstills between pieces."""
+
+    def __init__(
+        self, parts: Parts, pieces: Sequence[Piece], judge: Judge, changer: Changer
+    ) -> None:
+        self._parts, self._judge, self._changer = parts, judge, changer
+        self._pieces = pieces
+        self._known: dict[tuple[int, int, int], Change] = {}
+
+    def rest(self, i: int) -> tuple[float, float]:
+        """Return start and end of the standstill after piece i, s."""
+        spans = self._parts.spans
+        before, after = self._pieces[i], self._pieces[i + 1]
+        return float(spans.t1[before.last]), float(spans.t0[after.first])
+
+    def change(self, i: int, before: int, after: int) -> Change:
+        """Return the change after piece i between two representations."""
+        key = i, before, after
+        if key not in self._known:
+            parts, judge = self._parts, self._judge
+            last, first = self._pieces[i].last, self._pieces[i + 1].first
+            t0, t1 = self.rest(i)
+            self._known[key] = self._changer.change(
+                _configuration(parts, last, before, judge, at_end=True),
+                _configuration(parts, first, after, judge, at_end=False),
+                t1 - t0,
+            )
+        return self._known[key]
+
+
+def _best(
+    options: Sequence[dict[int, _Option]], changes: _Changes, judge: Judge
+) -> _Label:
+    """Return the best sequence of representations and ways (dynamic programme)."""
+    wheels = judge.winding_wheels
+    labels = [
+        _Label(
+            (sign,),
+            (),
+            option.cost,
+            tuple(map(Track.begin, wheels, option.sweeps)),
+        )
+        for sign, option in options[0].items()
+    ]
+    for i, present in enumerate(options[1:]):
+        t0, t1 = changes.rest(i)
+        labels = [
+            kept
+            for sign, option in present.items()
+            for kept in _kept(
+                _extended(label, way, sign, option, t1 - t0)
+                for label in labels
+                for way in changes.change(i, label.signs[-1], sign).ways
+            )
+        ]
+    return min(labels, key=lambda label: label.preference)
+
+
+def _extended(
+    label: _Label, way: Way, sign: int, option: _Option, rest: float
+) -> _Label:
+    """Return a label with one more standstill and piece."""
+    price = SHORT_REST if way.time > rest else 0.0
+    # Far below one violation: among equals the wheels turn least.
+    price += min(way.time, 1e3) * 1e-6 + (label.signs[-1] != sign) * 1e-9
+    tracks = tuple(
+        track.then(way, i, sweep, rest)
+        for i, (track, sweep) in enumerate(
+            zip(label.tracks, option.sweeps, strict=True)
+        )
+    )
+    return _Label(
+        (*label.signs, sign),
+        (*label.ways, way),
+        label.cost + price + option.cost,
+        tracks,
+    )
+
+
+def _kept(labels: Iterable[_Label]) -> list[_Label]:
+    """Return the labels of one representation that may be the best in the end.
+
+    Without winding wheels that is one. To keep only some of many is safe: they are all
+    possible, and what is left out can only make a verdict too strict.
+    """
+    kept: list[_Label] = []
+    for label in sorted(labels, key=lambda label: label.preference):
+        if not any(label.is_no_better(other) for other in kept):
+            kept.append(label)
+        if len(kept) == MAX_LABELS:
+            break
+    return kept
+
+
+def _standstills(
+    best: _Label, changes: _Changes, judge: Judge
+) -> tuple[Standstill, ...]:
+    unwindings = [track.unwound()[1] for track in best.tracks]
+    found = []
+    for i, ((before, after), way) in enumerate(
+        zip(itertools.pairwise(best.signs), best.ways, strict=True)
+    ):
+        change = changes.change(i, before, after)
+        wheel, turn, extra = change.wheel, change.turn, 0.0
+        for j, unwinding in enumerate(each[i] for each in unwindings):
+            if unwinding.time > extra:
+                extra = unwinding.time
+                wheel = judge.winding_wheels[j].index
+                turn = way.sweeps[j].turn + 2 * np.pi * unwinding.turns
+        made = Reconfiguration(change.start, change.goal, way.time + extra, wheel, turn)
+        found.append(Standstill(*changes.rest(i), made))
+    return tuple(found)
+
+
+def _anchors(best: _Label, parts: Parts, pieces: Sequence[Piece]) -> tuple[Anchor, ...]:
+    """Return where the winding wheels stand at the start of every piece."""
+    angles = []
+    for track in best.tracks:
+        turns, _ = track.unwound()
+        starts = [step.sweep.start for step in track.line()]
+        angles.append([s + 2 * np.pi * k for s, k in zip(starts, turns, strict=True)])
+    return tuple(
+        Anchor(float(parts.spans.t0[piece.first]), tuple(each[i] for each in angles))
+        for i, piece in enumerate(pieces)
+    )
+
+
+def _apart(
+    parts: Parts,
+    pieces: Sequence[Piece],
+    signs: Sequence[int],
+    judge: Judge,
+    lost: dict[tuple[int, int], bool],
+) -> tuple[Apart, ...]:
+    return tuple(
+        Apart(
+            float(parts.spans.t0[piece.first]),
+            float(parts.spans.t1[piece.last]),
+            _configuration(parts, piece.first, sign, judge, at_end=True),
+        )
+        for i, (piece, sign) in enumerate(zip(pieces, signs, strict=True))
+        if lost[i, sign]
+    )
+
+
+def _configuration(
+    parts: Parts, index: int, sign: int, judge: Judge, *, at_end: bool
+) -> Configuration:
+    """Return (κ_n, β) at an end of a part in one representation."""
+    e = parts.enclosure
+    v, omega = (e.v1, e.omega1) if at_end else (e.v0, e.omega0)
+    own = sign * float(e.sign[index])
+    body = own * (v[index] + 1j * omega[index] * judge.reference)
+    q = own * omega[index] / judge.kappa_g
+    kappa_n = float(np.clip(curvature_of_ratio(abs(body), q), -2.0, 2.0))
+    return kappa_n, float(np.angle(body)) if abs(body) > 0 else 0.0

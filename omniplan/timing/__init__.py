@@ -1,0 +1,1 @@
+"""The fastest timing of a path (TOPP-RA)."""
