@@ -8,7 +8,8 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from omniplan.batch.many import check_twists, validate_many
+    from omniplan.batch.many import validate_many
+    from omniplan.batch.twists import check_twists
     from omniplan.choosing.faults import Fault, Undrivable
     from omniplan.choosing.fitness import FleetVehicle, Suitability, suitable
     from omniplan.choosing.fleet import select
@@ -63,34 +64,34 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Fault": "faults",
-    "FleetVehicle": "fitness",
+    "Fault": "choosing.faults",
+    "FleetVehicle": "choosing.fitness",
     "InvalidTrajectory": "errors",
     "NotDrivable": "errors",
     "Path": "path",
-    "Shortfall": "shortfalls",
-    "SpeedProfile": "timing_result",
-    "Suitability": "fitness",
-    "Timing": "timing_result",
-    "TimingStatus": "timing_result",
-    "Tolerances": "rows",
+    "Shortfall": "choosing.shortfalls",
+    "SpeedProfile": "timing.result",
+    "Suitability": "choosing.fitness",
+    "Timing": "timing.result",
+    "TimingStatus": "timing.result",
+    "Tolerances": "judging.rows",
     "Trace": "trace",
     "Trajectory": "trajectory",
-    "Undrivable": "faults",
-    "Unfit": "shortfalls",
-    "check_twists": "batch_twists",
-    "fastest": "timing",
+    "Undrivable": "choosing.faults",
+    "Unfit": "choosing.shortfalls",
+    "check_twists": "batch.twists",
+    "fastest": "timing.fastest",
     "margins": "trace",
-    "parse_requirement": "requirements",
-    "plot_report": "plot",
-    "read_trajectories": "trajectory_io",
-    "select": "fleet",
-    "suitable": "fitness",
-    "time_path": "timing",
-    "time_paths": "timing",
+    "parse_requirement": "choosing.requirements",
+    "plot_report": "plots.pictures",
+    "read_trajectories": "inputs.files",
+    "select": "choosing.fleet",
+    "suitable": "choosing.fitness",
+    "time_path": "timing.fastest",
+    "time_paths": "timing.fastest",
     "validate": "validation",
-    "validate_many": "batch",
-    "write_trajectories": "trajectory_io",
+    "validate_many": "batch.many",
+    "write_trajectories": "inputs.files",
 }
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())
