@@ -521,8 +521,13 @@ def test_speeds_scale_with_the_limits(vehicle: Vehicle) -> None:
     data["kappa_g"] = vehicle.boundary_curvature
     factor = 1.7
     for wheel in data["wheels"]:
-        if wheel.get("max_speed"):
-            wheel["max_speed"] *= factor
+        # Steering rolls a wheel beside its axis: a zone of guaranteed rates stays where
+        # it is if all of them are quicker alike.
+        for key in ("max_speed", "max_steering_rate_deg"):
+            if wheel.get(key):
+                wheel[key] *= factor
+    for key, value in (data["guaranteed"] or {}).items():
+        data["guaranteed"][key] = value * factor
     for key, value in data["limits"].items():
         if isinstance(value, float):
             power = 2 if key == "max_lateral_acceleration" else 1
