@@ -40,7 +40,8 @@ test-fast: $(VENV)/.dev ## unit tests only
 	$(BIN)/python -m pytest -m "not slow" tests/unit $(TESTS)
 
 test-slow: $(VENV)/.dev ## long soundness runs
-	$(BIN)/python -m pytest -m slow --timeout 3600 $(TESTS)
+	$(BIN)/python -m pytest -m "slow or hypothesis" --hypothesis-profile default \
+	  --timeout 3600 $(TESTS)
 
 format fix: $(VENV)/.dev ## format and mend what the linter can
 	$(BIN)/ruff check --quiet --fix . ; $(BIN)/ruff format .
