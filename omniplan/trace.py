@@ -6,7 +6,6 @@ motion between the samples, and one per standstill.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,37 +14,18 @@ import numpy.typing as npt
 from configspace import PermissibleSpace
 from configspace.angles import wrap
 from configspace.omni_curve import curvature_of_ratio
-from omniplan.judging.judge import is_own, judge_for
-from omniplan.judging.proof import ROUNDING, Parts, Proof
-from omniplan.judging.rows import Judge, Tolerances
-from omniplan.motion import Intervals, Motion, motion_of
-from omniplan.standing.standstill import Choice, choose_configurations
+from omniplan.judging.proof import ROUNDING
+from omniplan.judging.rows import Tolerances
+from omniplan.motion import Intervals
+from omniplan.proving import Proved, prove
 from omniplan.trajectory import Trajectory
-from omniplan.validation import followed
 
-__all__ = ["Proved", "Trace", "margins", "prove"]
+__all__ = ["Trace", "margins", "trace_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
-LOOSE = 0.02
-"""Where a motion is cut finer, the margin is known to this ..."""
-LOOSE_HALVINGS, LOOSE_PARTS = 14, 4000
-"""... unless that takes more halvings or parts."""
 LEAST_MARGIN = -1e6
 """Stands for "infinitely far out", as in a report."""
-
-
-@dataclass(frozen=True, eq=False)
-class Proved:
-    """A motion, its parts and the representation that each is driven in."""
-
-    trajectory: Trajectory
-    space: PermissibleSpace
-    motion: Motion
-    judge: Judge
-    tolerances: Tolerances
-    parts: Parts
-    choice: Choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,55 +106,6 @@ def margins(
         longest=longest,
     )
     return trace_of(proved)
-
-
-def prove(
-    trajectory: Trajectory,
-    space: PermissibleSpace,
-    tolerances: Tolerances | None = None,
-    *,
-    allow_unreachable: bool = False,
-    longest: float | None = None,
-) -> Proved:
-    """Return the parts of a trajectory as `validate` judges them.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    space : PermissibleSpace
-    tolerances : Tolerances, optional
-    allow_unreachable : bool
-    longest : float, s, optional
-        No part is longer than this.
-    """
-    tolerances = tolerances or Tolerances()
-    motion = motion_of(trajectory, is_own=is_own(trajectory, space))
-    judge = judge_for(space, motion, tolerances)
-    proof = Proof(motion, judge, tolerances)
-    proof.decide()
-    choice = choose_configurations(
-        proof, judge, space, tolerances, allow_unreachable=allow_unreachable
-    )
-    proof.sharpen(choice.sign_of)
-    if longest is not None:
-        proof.refine(lambda parts: parts.spans.t1 - parts.spans.t0 > longest)
-        proof.refine(_loose(choice), LOOSE_HALVINGS)
-    parts = followed(proof, choice, judge, tolerances)
-    return Proved(trajectory, space, motion, judge, tolerances, parts, choice)
-
-
-def _loose(choice: Choice) -> Callable[[Parts], npt.NDArray[np.bool_]]:
-    """Return which parts do not tell their margin well."""
-
-    def wanted(parts: Parts) -> npt.NDArray[np.bool_]:
-        if len(parts.stands) > LOOSE_PARTS:
-            return np.zeros_like(parts.stands)
-        low, high = parts.picked(choice.sign_of(parts.spans))
-        best, worst = low.max(axis=1, initial=0.0), high.max(axis=1, initial=0.0)
-        loose = (worst > best + LOOSE) & (best <= 1 + ROUNDING)
-        return np.asarray(loose, dtype=bool)
-
-    return wanted
 
 
 def trace_of(proved: Proved) -> Trace:

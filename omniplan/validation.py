@@ -19,30 +19,27 @@ from configspace.omni_curve import curvature_of_ratio
 from configspace.space import require_space
 from configspace.vehicle import SteerableWheel
 from omniplan.judging.chords import Chord
-from omniplan.judging.judge import is_own, judge_for
-from omniplan.judging.proof import Parts, Proof
+from omniplan.judging.proof import Parts
 from omniplan.judging.rows import Judge, Tolerances
 from omniplan.judging.violations import (
     find_violations,
     reconfiguration_violations,
     unreachable_violations,
 )
-from omniplan.motion import Motion, PoseMotion, motion_of
+from omniplan.motion import Motion, PoseMotion
 from omniplan.path import Path
+from omniplan.proving import prove
 from omniplan.report import Advice, Report
 from omniplan.side_step import side_step
-from omniplan.standing.standstill import Choice, choose_configurations
-from omniplan.standing.winding import straddling, wound
+from omniplan.standing.standstill import Choice
 from omniplan.trajectory import Trajectory, timed
 
-__all__ = ["Tolerances", "followed", "judged", "validate"]
+__all__ = ["Tolerances", "judged", "validate"]
 
 MIN_FACTOR, MAX_FACTOR = 0.01, 100.0
 """Slower or faster than this nothing is promised."""
 FACTOR_STEP = 1.01
 """How near to a factor that is too large a proved one comes at least, as a ratio."""
-STOP_HALVINGS = 12
-"""How finely it is told when a wheel runs into a stop."""
 
 
 def validate(
@@ -131,15 +128,9 @@ def judged(
     allow_unreachable : bool
         As for `validate`.
     """
-    motion = motion_of(trajectory, is_own=is_own(trajectory, space))
-    judge = judge_for(space, motion, tolerances)
-    proof = Proof(motion, judge, tolerances)
-    proof.decide()
-    choice = choose_configurations(
-        proof, judge, space, tolerances, allow_unreachable=allow_unreachable
-    )
-    proof.sharpen(choice.sign_of)
-    parts = followed(proof, choice, judge, tolerances)
+    proved = prove(trajectory, space, tolerances, allow_unreachable=allow_unreachable)
+    motion, judge = proved.motion, proved.judge
+    parts, choice = proved.parts, proved.choice
     violations = [
         *find_violations(parts, choice, judge, trajectory, motion, space),
         *reconfiguration_violations(choice, judge, trajectory, motion, space),
@@ -164,32 +155,6 @@ def judged(
         interpolation=motion.interpolation,
         not_judged=tuple(_not_judged(space, motion)),
     )
-
-
-def followed(
-    proof: Proof, choice: Choice, judge: Judge, tolerances: Tolerances
-) -> Parts:
-    """Return the parts with the followed angles of the wheels that wind.
-
-    Parameters
-    ----------
-    proof : Proof
-        Decided and sharpened; refined where wheels run into their stops.
-    choice : Choice
-    judge : Judge
-    tolerances : Tolerances
-    """
-    wheels = judge.winding_wheels
-    if not choice.anchors:
-        return proof.parts
-    floor = -1.0 if proof.is_own else tolerances.standstill
-
-    def follow(parts: Parts) -> Parts:
-        sign, piece = choice.sign_of(parts.spans), choice.piece_of(parts.spans)
-        return wound(parts, judge, sign, piece, choice.anchors, floor)
-
-    proof.refine(lambda parts: straddling(follow(parts), wheels), STOP_HALVINGS)
-    return follow(proof.parts)
 
 
 def _margins(parts: Parts, choice: Choice, judge: Judge) -> tuple[float, str, float]:

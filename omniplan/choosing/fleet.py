@@ -22,9 +22,9 @@ from omniplan.choosing.passages import passage_shortfalls
 from omniplan.choosing.requirements import NoMirroring, PassableBackwards, Requirement
 from omniplan.choosing.shortfalls import Shortfall, Unfit
 from omniplan.path import Path
+from omniplan.proving import Proved, prove
 from omniplan.report import Candidate, Ranking, Report
 from omniplan.timing.fastest import time_paths
-from omniplan.trace import Proved, prove
 from omniplan.trajectory import Trajectory, require_motion
 from omniplan.validation import validate
 

@@ -23,8 +23,8 @@ from configspace import ClearanceMap, PermissibleSpace, clearance_map
 from configspace.omni_curve import curvature_of_ratio
 from omniplan.judging.chords import Chord, speed_of
 from omniplan.motion import Enclosure
+from omniplan.proving import Proved
 from omniplan.samples import HEADING_LENGTH
-from omniplan.trace import Proved
 
 __all__ = ["fleet_clearance", "reserve"]
 

@@ -11,8 +11,8 @@ from configspace import PermissibleSpace
 from configspace.omni_curve import components
 from omniplan.choosing.requirements import NoMirroring, PassableBackwards, Requirement
 from omniplan.choosing.shortfalls import Shortfall
+from omniplan.proving import Proved
 from omniplan.standing.standstill import Reconfiguration
-from omniplan.trace import Proved
 from omniplan.trajectory import Trajectory
 from omniplan.validation import validate
 from omniplan.wording import refusal

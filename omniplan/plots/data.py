@@ -14,8 +14,9 @@ from configspace.angles import wrap
 from configspace.plot_data import steering_span
 from configspace.vehicle import Castor, SteerableWheel
 from omniplan.motion import PoseMotion
+from omniplan.proving import prove
 from omniplan.report import Report, Violation
-from omniplan.trace import Trace, prove, trace_of
+from omniplan.trace import Trace, trace_of
 from omniplan.trajectory import Trajectory
 from omniplan.wording import quantity
 

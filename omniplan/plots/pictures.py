@@ -21,11 +21,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from configspace import InvalidInput, PermissibleSpace, Problem
-from configspace.plot_style import save_figure
+from configspace.plot_style import new_figure, save_figure
 from omniplan.plots.data import Drive, drive_of, marks_of
 from omniplan.plots.map import draw_on_space
 from omniplan.plots.path import draw_way
-from omniplan.plots.style import GOAL, PATH, START, legend_below, new_figure, plain
+from omniplan.plots.style import GOAL, PATH, START, legend_below, plain
 from omniplan.plots.time import draw_times, panels_of
 from omniplan.plots.verdicts import plot_verdicts
 from omniplan.report import Report

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
@@ -27,7 +26,6 @@ __all__ = [
     "add_marks",
     "edged",
     "legend_below",
-    "new_figure",
     "plain",
 ]
 
@@ -47,13 +45,6 @@ _NUMBER: dict[str, Any] = {
     "ec": BROKEN,
     "lw": 1.5,
 }
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of a size in inches that needs no pyplot."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def plain(name: str, longest: int = 60) -> str:

@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from configspace import InvalidInput, Problem
+from configspace.plot_style import new_figure
 from omniplan.choosing.faults import Undrivable
 from omniplan.choosing.shortfalls import Unfit
-from omniplan.plots.style import new_figure, plain
+from omniplan.plots.style import plain
 from omniplan.report import Ranking, Report
 
 __all__ = ["plot_verdicts", "verdict_text", "verdicts"]

@@ -11,7 +11,7 @@ from configspace import PermissibleSpace, exact_v_max
 from configspace.omni_curve import components
 from omniplan import Trajectory, select
 from omniplan.choosing.manoeuvrability import fleet_clearance, reserve
-from omniplan.trace import prove
+from omniplan.proving import prove
 
 SpaceOf = Callable[[str], PermissibleSpace]
 TURN = 0.5  # metres that a radian of turning counts

@@ -8,7 +8,7 @@ from configspace import PermissibleSpace
 from omniplan import Trajectory, validate
 from omniplan.choosing.passages import backwards, passage_shortfalls
 from omniplan.choosing.requirements import NoMirroring, PassableBackwards
-from omniplan.trace import prove
+from omniplan.proving import prove
 
 
 @pytest.fixture(scope="module")

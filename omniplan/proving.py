@@ -1,0 +1,118 @@
+"""The proof of one motion for one vehicle: decided, representations chosen, sharpened.
+
+`omniplan.validation` sums it up, `omniplan.trace` tells it part by part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace import PermissibleSpace
+from omniplan.judging.judge import is_own, judge_for
+from omniplan.judging.proof import ROUNDING, Parts, Proof
+from omniplan.judging.rows import Judge, Tolerances
+from omniplan.motion import Motion, motion_of
+from omniplan.standing.standstill import Choice, choose_configurations
+from omniplan.standing.winding import straddling, wound
+from omniplan.trajectory import Trajectory
+
+__all__ = ["Proved", "prove"]
+
+STOP_HALVINGS = 12
+"""How finely it is told when a wheel runs into a stop."""
+LOOSE = 0.02
+"""Where a motion is cut finer, the margin is known to this ..."""
+LOOSE_HALVINGS, LOOSE_PARTS = 14, 4000
+"""... unless that takes more halvings or parts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proved:
+    """A motion, its parts and the representation that each is driven in."""
+
+    trajectory: Trajectory
+    space: PermissibleSpace
+    motion: Motion
+    judge: Judge
+    tolerances: Tolerances
+    parts: Parts
+    choice: Choice
+
+
+def prove(
+    trajectory: Trajectory,
+    space: PermissibleSpace,
+    tolerances: Tolerances | None = None,
+    *,
+    allow_unreachable: bool = False,
+    longest: float | None = None,
+) -> Proved:
+    """Return the parts of a trajectory as `validate` judges them.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    space : PermissibleSpace
+    tolerances : Tolerances, optional
+    allow_unreachable : bool
+    longest : float, s, optional
+        No part is longer than this.
+    """
+    tolerances = tolerances or Tolerances()
+    motion = motion_of(trajectory, is_own=is_own(trajectory, space))
+    judge = judge_for(space, motion, tolerances)
+    proof = Proof(motion, judge, tolerances)
+    proof.decide()
+    choice = choose_configurations(
+        proof, judge, space, tolerances, allow_unreachable=allow_unreachable
+    )
+    proof.sharpen(choice.sign_of)
+    if longest is not None:
+        proof.refine(lambda parts: parts.spans.t1 - parts.spans.t0 > longest)
+        proof.refine(_loose(choice), LOOSE_HALVINGS)
+    parts = _followed(proof, choice, judge, tolerances)
+    return Proved(trajectory, space, motion, judge, tolerances, parts, choice)
+
+
+def _followed(
+    proof: Proof, choice: Choice, judge: Judge, tolerances: Tolerances
+) -> Parts:
+    """Return the parts with the followed angles of the wheels that wind.
+
+    Parameters
+    ----------
+    proof : Proof
+        Decided and sharpened; refined where wheels run into their stops.
+    choice : Choice
+    judge : Judge
+    tolerances : Tolerances
+    """
+    wheels = judge.winding_wheels
+    if not choice.anchors:
+        return proof.parts
+    floor = -1.0 if proof.is_own else tolerances.standstill
+
+    def follow(parts: Parts) -> Parts:
+        sign, piece = choice.sign_of(parts.spans), choice.piece_of(parts.spans)
+        return wound(parts, judge, sign, piece, choice.anchors, floor)
+
+    proof.refine(lambda parts: straddling(follow(parts), wheels), STOP_HALVINGS)
+    return follow(proof.parts)
+
+
+def _loose(choice: Choice) -> Callable[[Parts], npt.NDArray[np.bool_]]:
+    """Return which parts do not tell their margin well."""
+
+    def wanted(parts: Parts) -> npt.NDArray[np.bool_]:
+        if len(parts.stands) > LOOSE_PARTS:
+            return np.zeros_like(parts.stands)
+        low, high = parts.picked(choice.sign_of(parts.spans))
+        best, worst = low.max(axis=1, initial=0.0), high.max(axis=1, initial=0.0)
+        loose = (worst > best + LOOSE) & (best <= 1 + ROUNDING)
+        return np.asarray(loose, dtype=bool)
+
+    return wanted
