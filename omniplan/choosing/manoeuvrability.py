@@ -49,7 +49,7 @@ def reserve(proved: Proved, clearance: ClearanceMap) -> float:
     Parameters
     ----------
     proved : Proved
-        Of `omniplan.trace.prove`.
+        Of `omniplan.proving.prove`.
     clearance : ClearanceMap
         `fleet_clearance` of its space.
 

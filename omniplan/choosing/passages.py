@@ -28,7 +28,7 @@ def passage_shortfalls(
     Parameters
     ----------
     proved : Proved
-        Of `omniplan.trace.prove`.
+        Of `omniplan.proving.prove`.
     requirements : iterable of Requirement
         Those that a vehicle alone can meet are passed over.
     allow_unreachable : bool
