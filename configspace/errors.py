@@ -6,6 +6,10 @@
         InvalidTrajectory     (omniplan.errors)
         InvalidMessage        (services.errors)
       CacheError
+      NotDrivable             (omniplan.errors)
+      PlanningError           (omniplan.errors)
+        NoPlanFound
+        OptimisationFailed
       ServiceError ...        (services.errors)
 
 The class words the message: where, what was given, what is allowed. Errors of other

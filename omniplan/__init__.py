@@ -15,10 +15,17 @@ if TYPE_CHECKING:
     from omniplan.choosing.fleet import select
     from omniplan.choosing.requirements import parse_requirement
     from omniplan.choosing.shortfalls import Shortfall, Unfit
-    from omniplan.errors import InvalidTrajectory, NotDrivable
+    from omniplan.errors import (
+        InvalidTrajectory,
+        NoPlanFound,
+        NotDrivable,
+        OptimisationFailed,
+        PlanningError,
+    )
     from omniplan.inputs.files import read_trajectories, write_trajectories
     from omniplan.judging.rows import Tolerances
     from omniplan.path import Path
+    from omniplan.planning.result import Plan, PlanStatus
     from omniplan.plots.pictures import plot_report
     from omniplan.report import Advice, Candidate, Ranking, Report, Violation
     from omniplan.timing.fastest import fastest, time_path, time_paths
@@ -33,8 +40,13 @@ __all__ = [
     "Fault",
     "FleetVehicle",
     "InvalidTrajectory",
+    "NoPlanFound",
     "NotDrivable",
+    "OptimisationFailed",
     "Path",
+    "Plan",
+    "PlanStatus",
+    "PlanningError",
     "Ranking",
     "Report",
     "Shortfall",
@@ -67,8 +79,13 @@ _HOMES = {
     "Fault": "choosing.faults",
     "FleetVehicle": "choosing.fitness",
     "InvalidTrajectory": "errors",
+    "NoPlanFound": "errors",
     "NotDrivable": "errors",
+    "OptimisationFailed": "errors",
     "Path": "path",
+    "Plan": "planning.result",
+    "PlanStatus": "planning.result",
+    "PlanningError": "errors",
     "Shortfall": "choosing.shortfalls",
     "SpeedProfile": "timing.result",
     "Suitability": "choosing.fitness",

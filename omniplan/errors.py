@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from configspace.errors import InvalidInput, OmniplanError
 
-__all__ = ["InvalidTrajectory", "NotDrivable"]
+__all__ = [
+    "InvalidTrajectory",
+    "NoPlanFound",
+    "NotDrivable",
+    "OptimisationFailed",
+    "PlanningError",
+]
 
 
 class InvalidTrajectory(InvalidInput):
@@ -13,3 +19,15 @@ class InvalidTrajectory(InvalidInput):
 
 class NotDrivable(OmniplanError):
     """A path that a vehicle cannot drive, or that no timing could be proved for."""
+
+
+class PlanningError(OmniplanError):
+    """There is no plan."""
+
+
+class NoPlanFound(PlanningError):
+    """No way to the goal was found, or there is none."""
+
+
+class OptimisationFailed(PlanningError):
+    """A solver ended without a solution."""

@@ -1,0 +1,1 @@
+"""Plans that a vehicle can drive: moves, the search, the answer."""
