@@ -51,7 +51,7 @@ _OF_OPTIMISATION = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A trajectory that a vehicle can drive from start to goal, or why there is none."""
+    """A trajectory a vehicle can drive from start to goal, or why there is none."""
 
     vehicle: str
     status: PlanStatus
@@ -62,7 +62,7 @@ class Plan:
     report: Report | None = None
     """The verdict of `validate`: on the trajectory, or on what was refused."""
     place: Pose | None = None
-    """x m, y m, θ rad: where it fails; None for a success or if no place is to blame."""
+    """x m, y m, θ rad: where it fails; None for a success or where none is to blame."""
     stops: int = 0
     """How often the vehicle stands still on its way, start and goal not counted."""
     cusps: int = 0
