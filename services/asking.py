@@ -78,6 +78,8 @@ class Asker:
         self._is_closed = False
         self._has_met = False
         self._attempts: WeakSet[Stop] = WeakSet()
+        self._lost_one = Stop()
+        """Ends the attempts that nothing else ends; a new one after each loss."""
 
     @property
     def where(self) -> str:
@@ -144,9 +146,10 @@ class Asker:
 
     def attempt(self, stop: Stop | None) -> Stop:
         """Return what ends one attempt: the given one, or that a server goes."""
+        if stop is None:
+            return self._lost_one
         own = Stop()
-        if stop is not None:
-            stop.ends(own)
+        stop.ends(own)
         with self._lock:
             self._attempts.add(own)
         return own
@@ -169,7 +172,8 @@ class Asker:
         with self._lock:
             if self._peer is None or self._peer.is_connected_to(instance):
                 return
-            under_way = list(self._attempts)
+            under_way = [*self._attempts, self._lost_one]
+            self._lost_one = Stop()
         for attempt in under_way:
             attempt.set()
 
@@ -184,8 +188,8 @@ class Asker:
         began = time.monotonic()
         timeout = attempts.next_timeout()
         peer = self.peer(timeout)
-        name = uuid.uuid4().hex
         attempt = self.attempt(stop)
+        name = uuid.uuid4().hex if callable(payload) else ""
         replies = peer.ask(
             key,
             payload(name, timeout) if callable(payload) else payload,
@@ -196,7 +200,8 @@ class Asker:
             stop=attempt,
         )
         if attempt.is_set and not replies:
-            self.cancel(peer, name)
+            if name:
+                self.cancel(peer, name)
             if stop is not None and stop.is_set:
                 raise ServiceError(f"{key}: the question was cancelled")
             raise ServiceUnreachable(self.where, "the server has gone")

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
@@ -48,7 +49,8 @@ class Request:
         self._query = query
         self.key = str(query.key_expr)
         """What was asked; may have wildcards."""
-        self.n_bytes = 0 if query.payload is None else len(query.payload)
+        payload = query.payload
+        self.n_bytes = 0 if payload is None else len(payload)
         """Size of the payload."""
 
     @property
@@ -75,12 +77,12 @@ class Request:
     def reply(self, key: str, payload: bytes, encoding: str) -> None:
         """Send one reply under its concrete key."""
         with _wrapped(f"reply to {self.key}"):
-            self._query.reply(key, payload, encoding=zenoh.Encoding(encoding))
+            self._query.reply(key, payload, encoding=_encoding(encoding))
 
     def fail(self, payload: bytes, encoding: str) -> None:
         """Send an error reply."""
         with _wrapped(f"reply to {self.key}"):
-            self._query.reply_err(payload, encoding=zenoh.Encoding(encoding))
+            self._query.reply_err(payload, encoding=_encoding(encoding))
 
     def __enter__(self) -> Request:
         return self
@@ -383,7 +385,7 @@ class Peer:
             self._session.put(
                 key,
                 payload,
-                encoding=zenoh.Encoding(encoding),
+                encoding=_encoding(encoding),
                 congestion_control=zenoh.CongestionControl.BLOCK,
             )
 
@@ -446,7 +448,7 @@ class Peer:
             channel = self._session.get(
                 key,
                 payload=payload,
-                encoding=zenoh.Encoding(encoding),
+                encoding=_encoding(encoding),
                 timeout=timeout,
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -495,7 +497,7 @@ class Peer:
             channel = self._session.get(
                 key,
                 payload=payload,
-                encoding=None if payload is None else zenoh.Encoding(encoding),
+                encoding=None if payload is None else _encoding(encoding),
                 timeout=timeout,
                 target=zenoh.QueryTarget.ALL if everyone else None,
                 cancellation_token=None if stop is None else stop.token,
@@ -532,7 +534,7 @@ class Peer:
                 key,
                 receive,
                 payload=payload,
-                encoding=zenoh.Encoding(encoding),
+                encoding=_encoding(encoding),
                 timeout=timeout,
                 # Otherwise all replies but the last of a key are left out.
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -635,6 +637,11 @@ def _explain(
     raise kind("any of several addresses", "; ".join(reasons))
 
 
+@lru_cache(maxsize=64)
+def _encoding(text: str) -> zenoh.Encoding:
+    return zenoh.Encoding(text)
+
+
 @contextmanager
 def _wrapped(doing: str) -> Iterator[None]:
     """Turn zenoh's errors into ServiceError."""
@@ -657,8 +664,9 @@ def _published(sample: zenoh.Sample) -> Publication:
 
 
 def _received(reply: zenoh.Reply) -> Reply:
-    if reply.ok is not None:
-        return Reply(False, reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+    ok = reply.ok
+    if ok is not None:
+        return Reply(False, ok.payload.to_bytes(), str(ok.encoding))
     # A reply is one or the other.
     error: Any = reply.err
     return Reply(True, error.payload.to_bytes(), str(error.encoding))

@@ -52,15 +52,18 @@ def test_a_full_queue_answers_busy_at_once(
         )
         gate.wait_until_entered()
         assert submitted.acquire(timeout=30)
-        waiting = in_background.submit(client.vehicles)
+        waiting = in_background.submit(client.vehicle, "differential")
         assert submitted.acquire(timeout=30)
         assert narrow.health().queue_length == 1
         with pytest.raises(RemoteError) as caught:
-            client.health()
+            client.vehicle("differential")
         assert caught.value.code == "busy"
+        # What takes no work is answered all the same.
+        assert client.health().queue_length == 1
+        assert len(client.vehicles()) == 2
         gate.opened.set()
         assert len(running.result()) == 1
-        assert len(waiting.result()) == 2
+        assert waiting.result().name == "differential"
         assert client.health().errors == 1
 
 
@@ -92,7 +95,7 @@ def test_closing_finishes_what_runs_and_refuses_what_waits(
         )
         gate.wait_until_entered()
         assert submitted.acquire(timeout=30)
-        waiting = in_background.submit(client.vehicles)
+        waiting = in_background.submit(client.vehicle, "differential")
         assert submitted.acquire(timeout=30)
         closing = in_background.submit(narrow.close)
         with pytest.raises(RemoteError) as caught:
