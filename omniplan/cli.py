@@ -404,7 +404,7 @@ def _serve(options: argparse.Namespace) -> int:
 
     from services import logs
     from services.config import load_config, variables
-    from services.launch import registry_of, server_of, warm_up
+    from services.launch import registry_of, server_of, settle, warm_up
 
     file = options.config or os.environ.get("OMNIPLAN_CONFIG")
     flags = {p: getattr(options, p, None) for p in variables().values()}
@@ -416,6 +416,7 @@ def _serve(options: argparse.Namespace) -> int:
     with answers.progress_console().status("Getting ready"):
         warm_up(fleet)
     with registry_of(config, fleet) as registry:
+        settle()
         server = server_of(config, registry)
         server.start()
         try:
