@@ -27,8 +27,8 @@ import zenoh  # noqa: TID251 - what the service is compared with
 import configspace
 import omniplan
 from services import Client
-from services.keys import Keys, Route
-from services.messages import Health, ValidateReply, ValidateRequest, encode
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import Health, ValidateReply, ValidateRequest, encode
 
 VEHICLE = "mecanum"
 PER_TRAJECTORY = 10_000

@@ -40,7 +40,7 @@ import configspace
 import omniplan
 from omniplan.bench_cases import random_trajectories
 from services import Client, Health, ServiceError
-from services.versions import Version
+from services.registering.versions import Version
 
 FLEET = ("ift-four-steered", "mecanum", "differential")
 CONFIG = """

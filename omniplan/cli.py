@@ -402,9 +402,9 @@ def _serve(options: argparse.Namespace) -> int:
     import os
     import signal
 
-    from services import logs
-    from services.config import load_config, variables
-    from services.launch import registry_of, server_of, settle, warm_up
+    from services.operating import logs
+    from services.operating.config import load_config, variables
+    from services.operating.launch import registry_of, server_of, settle, warm_up
 
     file = options.config or os.environ.get("OMNIPLAN_CONFIG")
     flags = {p: getattr(options, p, None) for p in variables().values()}
@@ -445,7 +445,7 @@ def _fleet_of_entries(
     entries: Sequence[str] | None, console: Console
 ) -> list[PermissibleSpace]:
     """Return the vehicles of a configuration; a folder stands for all within it."""
-    from services.folder import fleet_of_folder
+    from services.registering.folder import fleet_of_folder
 
     folders = [entry for entry in entries or () if Path(entry).is_dir()]
     if not folders:
@@ -586,7 +586,7 @@ def _export(options: argparse.Namespace) -> int:
 
 def _schema(options: argparse.Namespace) -> int:
     from configspace import vehicle_schema
-    from services.config import service_schema
+    from services.operating.config import service_schema
     from services.schemas import MESSAGES, message_schema
 
     schemas = {"service": service_schema, "vehicle": vehicle_schema}

@@ -6,8 +6,9 @@ A `Server` answers for a fleet, a `Client` asks; keys and messages are described
 
 import logging
 
-from services.async_client import AsyncClient
-from services.client import Client
+from services.answering.server import Server
+from services.asking.async_client import AsyncClient
+from services.asking.client import Client
 from services.errors import (
     InvalidEndpoint,
     InvalidMessage,
@@ -20,10 +21,9 @@ from services.errors import (
     ServiceUnreachable,
     StoreError,
 )
-from services.messages import Health
-from services.registry import Registry
-from services.security import Roles, Security
-from services.server import Server
+from services.guarding.security import Roles, Security
+from services.protocol.messages import Health
+from services.registering.registry import Registry
 
 __all__ = [
     "AsyncClient",

@@ -7,8 +7,9 @@ from types import MappingProxyType
 from typing import Any
 
 from configspace.errors import InvalidInput, Problem
-from services import batch_messages, messages, registry_messages
-from services.messages import Message
+from services.protocol import batch_messages, messages
+from services.protocol.messages import Message
+from services.registering import registry_messages
 
 __all__ = ["MESSAGES", "message_schema"]
 

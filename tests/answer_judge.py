@@ -16,11 +16,11 @@ from odd_requests import Question
 import configspace
 import omniplan
 from omniplan.batch.many import SCHEMA
-from services.batch_messages import BatchPart
+from services.protocol.batch_messages import BatchPart
 from services.errors import CODES
-from services.messages import ErrorReply, SelectReply, ValidateReply, decode, encode
-from services.registry_messages import RegisterReply
-from services.session import Reply
+from services.protocol.messages import ErrorReply, SelectReply, ValidateReply, decode, encode
+from services.registering.registry_messages import RegisterReply
+from services.wire.exchange import Reply
 
 
 def written(data: Any) -> str:

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import configspace
 import omniplan
-from services.session import Reply
+from services.wire.exchange import Reply
 
 ANY_PORT = "tcp/127.0.0.1:0"
 ANY_TLS_PORT = "tls/127.0.0.1:0"

@@ -15,8 +15,8 @@ from mutations import Rng, choose, other_arrow, other_bytes, other_json
 
 import configspace
 import omniplan
-from services.arrow import ARROW
-from services.messages import JSON
+from services.protocol.arrow import ARROW
+from services.protocol.messages import JSON
 
 ROOT = "omniplan/v1/default"
 FIXED = ["ift-four-steered", "differential"]

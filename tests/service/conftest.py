@@ -14,9 +14,10 @@ from loopback import ANY_PORT, Ask, Fleet, Trajectories
 import configspace
 import omniplan
 from services import Client, Server
-from services.endpoint import Endpoint
-from services.session import Peer, Reply
-from services.workers import WorkerPool
+from services.answering.workers import WorkerPool
+from services.protocol.endpoint import Endpoint
+from services.wire.exchange import Reply
+from services.wire.session import Peer
 
 
 @pytest.fixture(scope="session")
@@ -105,7 +106,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
         assert gate.opened.wait(30)
         return omniplan.validate(trajectory, space, allow_unreachable=allow_unreachable)
 
-    monkeypatch.setattr("services.handlers.validate", held)
+    monkeypatch.setattr("services.answering.handlers.validate", held)
     yield gate
     gate.opened.set()
 

@@ -11,10 +11,11 @@ from authority import CLIENT_ONLY, Authority
 from loopback import ANY_TLS_PORT
 
 from services import Roles, Security, ServiceRefused
-from services.endpoint import Endpoint
-from services.keys import Keys
-from services.security import zenoh_entries
-from services.session import Peer, Publication, Request
+from services.guarding.security import zenoh_entries
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys
+from services.wire.exchange import Publication, Request
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

@@ -14,7 +14,7 @@ from loopback import Fleet, Trajectories
 import configspace
 import omniplan
 from services import AsyncClient, Client, RemoteError, Server
-from services.calls import Calls
+from services.answering.calls import Calls
 
 pytestmark = pytest.mark.service
 T = TypeVar("T")
@@ -132,7 +132,7 @@ def test_a_cancelled_task_cancels_its_question(
 def test_closing_the_parts_cancels_what_is_left(
     server: Server, trajectories: Trajectories, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.batches._next_size", lambda *_: 1)
+    monkeypatch.setattr("services.answering.batches._next_size", lambda *_: 1)
 
     async def ask() -> None:
         async with AsyncClient(server.endpoint, timeout=30.0) as client:

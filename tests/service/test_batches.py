@@ -14,13 +14,13 @@ import configspace
 import omniplan
 from omniplan import InvalidTrajectory, Path, Trajectory
 from services import Client, RemoteError, Server, ServiceError, ServiceTimeout
-from services import batch_client as batch_client_module
-from services.arrow import ARROW, read_table, write_table
-from services.arrow_motions import table_of_trajectories, table_of_twists
-from services.batch_messages import BatchTwistsRequest, BatchValidateRequest
-from services.calls import Calls
-from services.messages import ErrorReply, decode, encode
-from services.session import Reply
+from services.answering.calls import Calls
+from services.asking import batch_client as batch_client_module
+from services.protocol.arrow import ARROW, read_table, write_table
+from services.protocol.arrow_motions import table_of_trajectories, table_of_twists
+from services.protocol.batch_messages import BatchTwistsRequest, BatchValidateRequest
+from services.protocol.messages import ErrorReply, decode, encode
+from services.wire.exchange import Reply
 
 pytestmark = pytest.mark.service
 
@@ -64,7 +64,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
         assert held.opened.wait(30)
         return 1
 
-    monkeypatch.setattr("services.batches._next_size", one_by_one)
+    monkeypatch.setattr("services.answering.batches._next_size", one_by_one)
     yield held
     held.opened.set()
 
@@ -257,7 +257,9 @@ def test_a_vehicle_that_changes_ends_the_batch(
     fleet: Fleet, held: Held, many: list[Trajectory], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     digests = iter("abcdef")
-    monkeypatch.setattr("services.batches.fleet_digest", lambda _: next(digests))
+    monkeypatch.setattr(
+        "services.answering.batches.fleet_digest", lambda _: next(digests)
+    )
     monkeypatch.setattr(batch_client_module, "SAMPLES", 6)
     held.opened.set()
     with (

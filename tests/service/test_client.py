@@ -14,8 +14,8 @@ from loopback import ANY_PORT, Fleet, Trajectories
 import configspace
 import omniplan
 from services import Client, RemoteError, Server, ServiceUnreachable
-from services.endpoint import Endpoint
-from services.messages import SelectRequest
+from services.protocol.endpoint import Endpoint
+from services.protocol.messages import SelectRequest
 
 pytestmark = pytest.mark.service
 

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from services import batch_messages, messages, registry_messages, schemas
+from services import schemas
 from services.errors import CODES
-from services.keys import Keys, Route
+from services.protocol import batch_messages, messages
+from services.protocol.keys import Keys, Route
+from services.registering import registry_messages
 
 PAGE = (Path(__file__).parents[2] / "docs" / "service.md").read_text("utf-8")
 BLOCKS: list[tuple[str, str]] = re.findall(

@@ -27,12 +27,13 @@ from odd_requests import FIXED, MAX_BYTES, ROOT, Question, Source
 
 import configspace
 from services import Client, Registry
-from services.endpoint import Endpoint
 from services.errors import ServiceError
-from services.messages import JSON, Health, decode
-from services.registry_messages import RegisterReply
-from services.session import Peer, Reply, Stop
-from services.versions import Version
+from services.protocol.endpoint import Endpoint
+from services.protocol.messages import JSON, Health, decode
+from services.registering.registry_messages import RegisterReply
+from services.registering.versions import Version
+from services.wire.exchange import Reply, Stop
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 
@@ -46,8 +47,8 @@ SERVER = """
 import json, sys
 import configspace
 from services import Registry, Server
-from services.launch import warm_up
-from services.logs import configure
+from services.operating.launch import warm_up
+from services.operating.logs import configure
 
 folder, fleet, max_bytes = json.loads(sys.argv[1])
 configure("warning", "json")
@@ -241,7 +242,7 @@ def run(live: Live, fleet: Fleet, trajectories: Trajectories, n: int) -> Counter
     assert not [x for x in lines if "exception" in x]
     # What other servers say and cannot be used is told as an error; nothing else is.
     errors = {x["logger"] for x in lines if x["level"] == "error"}
-    assert errors <= {"services.registry", "services.sync"}
+    assert errors <= {"services.registering.registry", "services.registering.sync"}
     check_known(live, running.judge, sent)
     return running.codes
 

@@ -282,12 +282,13 @@ def test_an_answer_that_is_none_of_ours_is_an_error(
     monkeypatch: pytest.MonkeyPatch,
     trajectories: Trajectories,
 ) -> None:
-    from services.handlers import Answer
+    from services.answering.handlers import Answer
 
     for payload in (b"", b"\xff", b"{}", b'{"reports": [{}]}', b'{"reports": []}'):
         answer = Answer(payload)
         monkeypatch.setattr(
-            "services.handlers.Handlers.answer", lambda *_, answer=answer: answer
+            "services.answering.handlers.Handlers.answer",
+            lambda *_, answer=answer: answer,
         )
         for question in (
             lambda: client.validate(trajectories, "differential"),

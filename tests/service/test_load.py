@@ -28,11 +28,12 @@ from loopback import ANY_PORT, Ask, Fleet
 
 import omniplan
 from services import Client, RemoteError, Server
-from services.calls import Call
-from services.endpoint import Endpoint
-from services.handlers import Answer, Handlers, Parts
-from services.keys import Route
-from services.session import Peer, Reply
+from services.answering.calls import Call
+from services.answering.handlers import Answer, Handlers, Parts
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Route
+from services.wire.exchange import Reply
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

@@ -6,14 +6,15 @@ import re
 from pathlib import Path
 from typing import get_args
 
-from services import keys, schemas
+from services import schemas
 from services.errors import CODES
-from services.keys import Keys, Verb
+from services.protocol import keys
+from services.protocol.keys import Keys, Verb
 
 ROOT = Path(__file__).parents[2]
 SERVICE = (ROOT / "docs" / "service.md").read_text("utf-8")
 REGISTRATION = (ROOT / "docs" / "registration.md").read_text("utf-8")
-SOURCES = [path.read_text("utf-8") for path in (ROOT / "services").glob("*.py")]
+SOURCES = [path.read_text("utf-8") for path in (ROOT / "services").rglob("*.py")]
 
 
 def section(page: str, title: str) -> str:

@@ -13,7 +13,7 @@ import configspace
 import omniplan
 from services import Client, InvalidMessage, RemoteError, Server
 from services.errors import CODES
-from services.session import Reply
+from services.wire.exchange import Reply
 
 pytestmark = pytest.mark.service
 
@@ -246,7 +246,7 @@ def test_a_failure_of_the_server_is_logged_and_not_shown(
         raise RuntimeError("secret of the insides")
 
     with monkeypatch.context() as patch:
-        patch.setattr("services.handlers.validate", broken)
+        patch.setattr("services.answering.handlers.validate", broken)
         with pytest.raises(RemoteError) as caught:
             client.validate(trajectories, "differential")
     assert caught.value.code == "internal"

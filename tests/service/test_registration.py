@@ -14,10 +14,11 @@ from loopback import ANY_PORT, Ask, Fleet, Trajectories
 import configspace
 import omniplan
 from services import Client, Registry, RemoteError, Server
-from services.endpoint import Endpoint
-from services.keys import Keys
-from services.registry_messages import VehicleEvent
-from services.session import Peer, Publication
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys
+from services.registering.registry_messages import VehicleEvent
+from services.wire.exchange import Publication
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

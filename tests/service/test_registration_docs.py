@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from services import messages, registry_messages
-from services.config import load_config
-from services.keys import Keys
-from services.registry import MAX_VEHICLE_BYTES
-from services.sync import CATCH_UP_WITHIN, MEET_WITHIN
-from services.versions import Version
+from services.operating.config import load_config
+from services.protocol import messages
+from services.protocol.keys import Keys
+from services.registering import registry_messages
+from services.registering.registry import MAX_VEHICLE_BYTES
+from services.registering.sync import CATCH_UP_WITHIN, MEET_WITHIN
+from services.registering.versions import Version
 
 PAGE = (Path(__file__).parents[2] / "docs" / "registration.md").read_text("utf-8")
 BLOCKS: list[tuple[str, str]] = re.findall(

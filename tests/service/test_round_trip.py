@@ -9,8 +9,8 @@ from loopback import Fleet, Trajectories
 import configspace
 import omniplan
 from services import Client, RemoteError, Server
-from services.endpoint import Endpoint
-from services.session import Peer
+from services.protocol.endpoint import Endpoint
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

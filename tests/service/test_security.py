@@ -30,12 +30,12 @@ from services import (
     ServiceRefused,
     ServiceUnreachable,
 )
-from services.endpoint import Endpoint
-from services.keys import Keys, Route
-from services.messages import JSON
-from services.registry import Registry
-from services.security import zenoh_entries
-from services.session import Peer
+from services.guarding.security import zenoh_entries
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import JSON
+from services.registering.registry import Registry
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

@@ -16,11 +16,11 @@ from loopback import ANY_TLS_PORT, Fleet
 import services
 from omniplan.cli import main
 from services import Client, Security
-from services.access import _QUESTIONS, _REGISTRATION, Roles, access_control
-from services.certificates import _REFUSALS
-from services.config import load_config
-from services.keys import Keys
-from services.launch import registry_of, server_of
+from services.guarding.access import _QUESTIONS, _REGISTRATION, Roles, access_control
+from services.guarding.certificates import _REFUSALS
+from services.operating.config import load_config
+from services.operating.launch import registry_of, server_of
+from services.protocol.keys import Keys
 
 PAGE = (Path(__file__).parents[2] / "docs" / "security.md").read_text("utf-8")
 BLOCKS: dict[str, str] = dict(

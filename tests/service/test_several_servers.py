@@ -21,11 +21,12 @@ from loopback import Fleet, Trajectories
 import configspace
 import omniplan
 from services import Client, Registry, RemoteError, Server
-from services.endpoint import Endpoint
-from services.keys import Keys, Route
-from services.session import Peer, Request
-from services.sync import Sync
-from services.versions import Version
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys, Route
+from services.registering.sync import Sync
+from services.registering.versions import Version
+from services.wire.exchange import Request
+from services.wire.session import Peer
 
 pytestmark = pytest.mark.service
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services import InvalidSecurity, Roles
-from services.access import access_control, servers_only
-from services.keys import Keys
+from services.guarding.access import access_control, servers_only
+from services.protocol.keys import Keys
 
 KEYS = Keys("hall-3")
 ROLES = ("planners", "fleet_managers", "vehicles", "servers")

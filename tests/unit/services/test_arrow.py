@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arrow import MAX_COLUMNS, MAX_PIECES, parameters_of, read_table
-from services.arrow import write_table as written
 from services.errors import InvalidMessage
+from services.protocol.arrow import MAX_COLUMNS, MAX_PIECES, parameters_of, read_table
+from services.protocol.arrow import write_table as written
 
 END = b"\xff\xff\xff\xff\0\0\0\0"
 TABLE = pa.table(

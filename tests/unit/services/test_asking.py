@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.asking import Asker, Attempts, error_of
-from services.endpoint import Endpoint
+from services.asking.asker import Asker, Attempts, error_of
 from services.errors import (
     RemoteError,
     ServiceError,
@@ -13,8 +12,9 @@ from services.errors import (
     ServiceTimeout,
     ServiceUnreachable,
 )
-from services.keys import Keys
-from services.session import Reply, Stop
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys
+from services.wire.exchange import Reply, Stop
 
 PLACE = Endpoint("127.0.0.1", 7447)
 GONE = ServiceUnreachable("tcp/127.0.0.1:7447", "nobody answers")
@@ -65,7 +65,7 @@ def test_pauses_end_with_the_time_for_the_question() -> None:
 
 def test_pauses_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr("services.asking.time.sleep", pauses.append)
+    monkeypatch.setattr("services.asking.asker.time.sleep", pauses.append)
     attempts = Attempts(asker(), "health", 1000.0)
     for _ in range(12):
         attempts.pause_after(GONE)

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from services.asking import Asker
-from services.endpoint import Endpoint
+from services.asking.asker import Asker
 from services.errors import ServiceTimeout
-from services.keys import Keys, Route
-from services.session import Reply
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys, Route
+from services.wire.exchange import Reply
 
 
 class Peer:

@@ -12,18 +12,18 @@ import configspace
 import omniplan
 from configspace import InvalidInput, PermissibleSpace
 from omniplan import Trajectory
-from services import batches
-from services.answers import Answer, Parts
-from services.arrow import ARROW, parameters_of, read_table, write_table
-from services.arrow_motions import table_of_trajectories, table_of_twists
-from services.batch_messages import (
+from services.answering import batches
+from services.answering.answers import Answer, Parts
+from services.answering.calls import Call, Calls
+from services.errors import CallStopped, InvalidMessage
+from services.protocol.arrow import ARROW, parameters_of, read_table, write_table
+from services.protocol.arrow_motions import table_of_trajectories, table_of_twists
+from services.protocol.batch_messages import (
     BatchPart,
     BatchTwistsRequest,
     BatchValidateRequest,
 )
-from services.calls import Call, Calls
-from services.errors import CallStopped, InvalidMessage
-from services.messages import RequestLimits, decode, encode
+from services.protocol.messages import RequestLimits, decode, encode
 
 LIMITS = RequestLimits(max_batch_samples=300)
 

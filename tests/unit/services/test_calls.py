@@ -5,7 +5,7 @@ import math
 import pytest
 
 from configspace import InvalidInput
-from services.calls import REMEMBERED, Call, Calls
+from services.answering.calls import REMEMBERED, Call, Calls
 from services.errors import CODES, CallStopped
 
 
@@ -13,7 +13,7 @@ from services.errors import CODES, CallStopped
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The time, to be changed."""
     now = [100.0]
-    monkeypatch.setattr("services.calls.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("services.answering.calls.time.monotonic", lambda: now[0])
     return now
 
 

@@ -11,7 +11,7 @@ import pytest
 from authority import CLIENT_ONLY, Authority
 
 from services import InvalidSecurity, Security, ServiceError
-from services.certificates import Side, checked_name, is_open_to_all, refusal
+from services.guarding.certificates import Side, checked_name, is_open_to_all, refusal
 
 SIDES: tuple[Side, ...] = ("client", "server")
 

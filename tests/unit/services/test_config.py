@@ -10,14 +10,14 @@ from pydantic import ValidationError
 import configspace
 from configspace import InvalidInput
 from services import Server
-from services.config import (
+from services.operating.config import (
     ServiceConfig,
     load_config,
     service_schema,
     variables,
 )
-from services.launch import registry_of, server_of
-from services.messages import RequestLimits
+from services.operating.launch import registry_of, server_of
+from services.protocol.messages import RequestLimits
 
 FULL = """
 fleet = ["vehicles", "mecanum", "more/one.yaml", "/abs/two.yaml"]

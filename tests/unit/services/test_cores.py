@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numba
 import pytest
 
-from services.cores import large_at_once, share_cores
+from services.answering.cores import large_at_once, share_cores
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from services import InvalidEndpoint
-from services.endpoint import Endpoint
+from services.protocol.endpoint import Endpoint
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import pytest
 
 from configspace import CacheError, InvalidInput, InvalidVehicle, Problem
 from omniplan.errors import InvalidTrajectory
+from services.answering.handlers import error_reply
 from services.errors import (
     CODES,
     InvalidEndpoint,
@@ -13,7 +14,6 @@ from services.errors import (
     ServiceTimeout,
     ServiceUnreachable,
 )
-from services.handlers import error_reply
 
 PROBLEM = Problem("t[3]", "NaN", "must be finite")
 

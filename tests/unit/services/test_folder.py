@@ -7,7 +7,7 @@ import pytest
 
 import configspace
 from configspace import Grid, InvalidInput
-from services.folder import fleet_of_folder
+from services.registering.folder import fleet_of_folder
 
 GRID = Grid(8, 16)
 

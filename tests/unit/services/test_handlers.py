@@ -9,13 +9,13 @@ import configspace
 from omniplan import select, validate
 from omniplan.report import Ranking, Report
 from omniplan.trajectory import Trajectory
-from services.answers import Answer
-from services.calls import Call, Calls
+from services.answering.answers import Answer
+from services.answering.calls import Call, Calls
+from services.answering.handlers import SHEET, Handlers, error_reply
 from services.errors import CallStopped, InvalidMessage
-from services.handlers import SHEET, Handlers, error_reply
-from services.keys import Route
-from services.messages import Health, RequestLimits
-from services.registry import Registry
+from services.protocol.keys import Route
+from services.protocol.messages import Health, RequestLimits
+from services.registering.registry import Registry
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import pytest
 
 from configspace import InvalidInput
 from services.errors import InvalidMessage
-from services.keys import Keys, Route
+from services.protocol.keys import Keys, Route
 
 BAD_CHUNKS = ["", "a/b", "*", "a*", "$*", "a?b", "#", "@x", "ä", "a b", "a\n", "-a"]
 ROUTES = {

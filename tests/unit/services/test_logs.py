@@ -10,7 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.logs import JsonFormatter, LogFormat, Relay, TextFormatter, configure
+from services.operating.logs import (
+    JsonFormatter,
+    LogFormat,
+    Relay,
+    TextFormatter,
+    configure,
+)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from omniplan.choosing.shortfalls import Shortfall, Unfit
 from omniplan.report import Candidate, Ranking, Report, Violation
 from omniplan.trajectory import Trajectory
 from services.errors import InvalidMessage
-from services.messages import (
+from services.protocol.messages import (
     ErrorReply,
     RequestLimits,
     SelectReply,

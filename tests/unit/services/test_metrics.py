@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from services.metrics import N_BINS, Histogram, Metrics, resident_bytes
+from services.answering.metrics import N_BINS, Histogram, Metrics, resident_bytes
 
 RATIO = 10 ** (1 / 20)
 

@@ -17,10 +17,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 import configspace
 from configspace import Grid, InvalidInput, InvalidVehicle
 from services.errors import InvalidMessage, RegistrationRefused
-from services.registry import ABSENT, MAX_VEHICLE_BYTES, Change, Registry
-from services.registry_messages import Digest, RecordEntry, Records
-from services.store import Record
-from services.versions import Version
+from services.registering.registry import ABSENT, MAX_VEHICLE_BYTES, Change, Registry
+from services.registering.registry_messages import Digest, RecordEntry, Records
+from services.registering.store import Record
+from services.registering.versions import Version
 
 GRID = Grid(8, 16)
 NAMES = ("a", "b", "c")
@@ -201,7 +201,7 @@ def test_servers_that_hear_of_all_changes_in_any_order_end_alike(
 
 
 def exchange(to: Registry, source: Registry) -> None:
-    """Let one server take over what another one has, as `services.sync` does."""
+    """Let one server take over what another one has, as `sync` does."""
     digest = Digest.of(source.snapshot, to.snapshot.state)
     names = digest.newer_than(to.snapshot)
     for entry in Records.of(source.snapshot, names).records:
@@ -316,7 +316,7 @@ def test_what_cannot_be_stored_is_not_registered(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("services.store.os.replace", full)
+    monkeypatch.setattr("services.registering.store.os.replace", full)
     error = refusal(registry, "agv", vehicle_file("agv", 2.0))
     assert error.code == "not_stored"
     assert "No space left" in str(error)
@@ -352,7 +352,7 @@ def test_a_record_that_cannot_be_read_here_takes_the_vehicle_out_of_use(
 
 
 def test_records_fill_messages_of_bounded_size(registry: Registry) -> None:
-    from services.registry_messages import MAX_RECORDS_BYTES
+    from services.registering.registry_messages import MAX_RECORDS_BYTES
 
     long = "x" * (MAX_RECORDS_BYTES // 2 + 1)
     for name in NAMES:

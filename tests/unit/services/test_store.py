@@ -26,8 +26,8 @@ from hypothesis.stateful import (
 
 from configspace import InvalidInput
 from services.errors import StoreError
-from services.store import Record, VehicleStore
-from services.versions import Version
+from services.registering.store import Record, VehicleStore
+from services.registering.versions import Version
 
 INSTANCE = "0123456789abcdef"
 
@@ -186,7 +186,7 @@ def test_a_write_that_fails_changes_nothing(
         store.write(record(counter=1))
         for name in ("fsync", "replace"):
             with monkeypatch.context() as patch:
-                patch.setattr(f"services.store.os.{name}", full)
+                patch.setattr(f"services.registering.store.os.{name}", full)
                 with pytest.raises(StoreError, match="No space left"):
                     store.write(record(counter=2))
             assert store.records["agv"].version.counter == 1
@@ -203,8 +203,8 @@ def test_a_record_has_a_name_that_can_be_a_key() -> None:
 
 WRITER = """
 import os, sys
-from services.store import Record, VehicleStore
-from services.versions import Version
+from services.registering.store import Record, VehicleStore
+from services.registering.versions import Version
 
 def tell(text):
     os.write(1, f"{text}\\n".encode())  # at once, lines of both processes whole

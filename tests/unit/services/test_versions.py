@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from configspace import InvalidInput
-from services.versions import MAX_COUNTER, Clock, Version
+from services.registering.versions import MAX_COUNTER, Clock, Version
 
 A, B = "a" * 16, "b" * 16
 VERSIONS = st.builds(

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services import workers
-from services.workers import PoolLimits, WorkerPool
+from services.answering import workers
+from services.answering.workers import PoolLimits, WorkerPool
 
 
 @dataclass

@@ -25,9 +25,9 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from configspace.errors import InvalidInput, Problem
-from services.endpoint import DEFAULT_ENDPOINT, Endpoint
-from services.keys import checked_chunk
-from services.logs import LogFormat, LogLevel
+from services.operating.logs import LogFormat, LogLevel
+from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
+from services.protocol.keys import checked_chunk
 
 __all__ = [
     "LimitsConfig",

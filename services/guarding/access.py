@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from configspace.errors import InvalidInput, Problem
 from services.errors import InvalidSecurity
-from services.keys import Keys, checked_chunk
+from services.protocol.keys import Keys, checked_chunk
 
 __all__ = ["Roles", "access_control", "servers_only"]
 

@@ -13,24 +13,24 @@ from typing import Self
 
 from configspace.errors import InvalidInput, Problem
 from configspace.space import PermissibleSpace
-from services.cores import large_at_once
-from services.dispatch import Dispatcher
-from services.endpoint import DEFAULT_ENDPOINT, Endpoint
+from services.answering.cores import large_at_once
+from services.answering.dispatch import Dispatcher
+from services.answering.handlers import Handlers
+from services.answering.metrics import KeyFigures, resident_bytes
+from services.answering.upkeep import Upkeep
+from services.answering.workers import PoolLimits
 from services.errors import ServiceError
-from services.handlers import Handlers
-from services.keys import Keys
-from services.messages import Health, KeyHealth, RequestLimits
-from services.metrics import KeyFigures, resident_bytes
-from services.registry import Registry
-from services.security import (
+from services.guarding.security import (
     Security,
     check_listen,
     check_peers,
     zenoh_entries,
 )
-from services.session import Peer
-from services.upkeep import Upkeep
-from services.workers import PoolLimits
+from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
+from services.protocol.keys import Keys
+from services.protocol.messages import Health, KeyHealth, RequestLimits
+from services.registering.registry import Registry
+from services.wire.session import Peer
 
 __all__ = ["Server"]
 

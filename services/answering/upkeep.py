@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from services.keys import Keys
-from services.presence import Presence
-from services.registration import PutRequest
-from services.registry import Registry
-from services.session import Peer, Request
-from services.sync import Sync
+from services.protocol.keys import Keys
+from services.registering.presence import Presence
+from services.registering.registration import PutRequest
+from services.registering.registry import Registry
+from services.registering.sync import Sync
+from services.wire.exchange import Request
+from services.wire.session import Peer
 
 __all__ = ["Upkeep"]
 

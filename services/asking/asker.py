@@ -14,7 +14,6 @@ import uuid
 from collections.abc import Callable, Mapping, Sequence
 from weakref import WeakSet
 
-from services.endpoint import Endpoint
 from services.errors import (
     InvalidMessage,
     RemoteError,
@@ -23,9 +22,11 @@ from services.errors import (
     ServiceTimeout,
     ServiceUnreachable,
 )
-from services.keys import Keys, Route
-from services.messages import JSON, ErrorReply, decode
-from services.session import Peer, Reply, Stop
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import JSON, ErrorReply, decode
+from services.wire.exchange import Reply, Stop
+from services.wire.session import Peer
 
 __all__ = ["Asker", "Attempts", "error_of"]
 
@@ -52,7 +53,7 @@ class Asker:
     endpoints : sequence of Endpoint
     keys : Keys
     entries : mapping
-        Of `services.security.zenoh_entries`.
+        Of `services.guarding.security.zenoh_entries`.
     attempt_timeout : float, s
         Time for one attempt.
     retry : bool

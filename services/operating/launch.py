@@ -11,10 +11,10 @@ import configspace
 import omniplan
 from configspace.space import PermissibleSpace
 from omniplan.batch.lookup import CHUNK
-from services.config import ServiceConfig
-from services.registry import Registry
-from services.security import Roles, Security
-from services.server import Server
+from services.answering.server import Server
+from services.guarding.security import Roles, Security
+from services.operating.config import ServiceConfig
+from services.registering.registry import Registry
 
 __all__ = ["registry_of", "server_of", "settle", "warm_up"]
 

@@ -17,23 +17,23 @@ import pyarrow as pa
 
 from configspace.vehicle import Vehicle
 from omniplan.trajectory import Trajectory
-from services.arrow import ARROW, parameters_of, read_table, write_table
-from services.arrow_motions import table_of_trajectories
-from services.asking import Asker, Attempts, error_of
-from services.batch_messages import (
-    BatchPart,
-    BatchTwistsRequest,
-    BatchValidateRequest,
-)
+from services.asking.asker import Asker, Attempts, error_of
 from services.errors import (
     InvalidMessage,
     ServiceError,
     ServiceTimeout,
     ServiceUnreachable,
 )
-from services.keys import Route
-from services.messages import decode, encode
-from services.session import Reply, Stop, Stream
+from services.protocol.arrow import ARROW, parameters_of, read_table, write_table
+from services.protocol.arrow_motions import table_of_trajectories
+from services.protocol.batch_messages import (
+    BatchPart,
+    BatchTwistsRequest,
+    BatchValidateRequest,
+)
+from services.protocol.keys import Route
+from services.protocol.messages import decode, encode
+from services.wire.exchange import Reply, Stop, Stream
 
 __all__ = ["Part", "Progress", "Question", "asked", "questions_of", "slices_of"]
 

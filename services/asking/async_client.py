@@ -18,12 +18,12 @@ from configspace.vehicle import Vehicle
 from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
 from omniplan.trajectory import Trajectory
-from services.batch_client import Progress
-from services.client import Client
-from services.endpoint import DEFAULT_ENDPOINT
-from services.messages import Health
-from services.security import Security
-from services.session import Stop
+from services.asking.batch_client import Progress
+from services.asking.client import Client
+from services.guarding.security import Security
+from services.protocol.endpoint import DEFAULT_ENDPOINT
+from services.protocol.messages import Health
+from services.wire.exchange import Stop
 
 __all__ = ["AsyncClient"]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 
 from configspace.space import PermissibleSpace
-from services.asking import Asker
-from services.session import Peer, Publication
+from services.asking.asker import Asker
+from services.wire.exchange import Publication
+from services.wire.session import Peer
 
 __all__ = ["SheetCache"]
 

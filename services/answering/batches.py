@@ -15,16 +15,16 @@ from configspace.vehicle_io import vehicle_from_data
 from omniplan.batch.many import Batch
 from omniplan.batch.twists import check_twists
 from omniplan.trajectory import Trajectory
-from services.answers import Answer, Parts
-from services.arrow import ARROW, parameters_of, read_table, write_table
-from services.arrow_motions import trajectories_in, twists_in
-from services.batch_messages import (
+from services.answering.answers import Answer, Parts
+from services.answering.calls import Call
+from services.protocol.arrow import ARROW, parameters_of, read_table, write_table
+from services.protocol.arrow_motions import trajectories_in, twists_in
+from services.protocol.batch_messages import (
     BatchPart,
     BatchTwistsRequest,
     BatchValidateRequest,
 )
-from services.calls import Call
-from services.messages import RequestLimits, decode, encode
+from services.protocol.messages import RequestLimits, decode, encode
 
 __all__ = ["Choose", "fleet_digest", "judge_twists", "validate_batch"]
 

@@ -14,13 +14,13 @@ from configspace.storage import dump_space
 from omniplan import InvalidTrajectory, validate
 from omniplan.choosing.fleet import ranked_by
 from omniplan.report import Ranking
-from services.answers import Answer, Parts
-from services.arrow import ARROW
-from services.batches import judge_twists, validate_batch
-from services.calls import Call
+from services.answering.answers import Answer, Parts
+from services.answering.batches import judge_twists, validate_batch
+from services.answering.calls import Call
 from services.errors import CallStopped, InvalidMessage, RegistrationRefused
-from services.keys import Route
-from services.messages import (
+from services.protocol.arrow import ARROW
+from services.protocol.keys import Route
+from services.protocol.messages import (
     JSON,
     ErrorReply,
     Health,
@@ -34,8 +34,8 @@ from services.messages import (
     encode,
     trajectories_from,
 )
-from services.registration import change
-from services.registry import Registry
+from services.registering.registration import change
+from services.registering.registry import Registry
 
 __all__ = ["SHEET", "Answer", "Handlers", "Parts", "check_size", "error_reply"]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from services.messages import CHUNK, Count, Message, Names, Question
+from services.protocol.messages import CHUNK, Count, Message, Names, Question
 
 __all__ = ["BatchPart", "BatchTwistsRequest", "BatchValidateRequest"]
 

@@ -18,10 +18,10 @@ import time
 
 from configspace.errors import InvalidInput
 from services.errors import InvalidMessage, RegistrationRefused, ServiceError
-from services.keys import Keys
-from services.messages import JSON, decode, encode
-from services.registry import Change, Registry, Snapshot
-from services.registry_messages import (
+from services.protocol.keys import Keys
+from services.protocol.messages import JSON, decode, encode
+from services.registering.registry import Change, Registry, Snapshot
+from services.registering.registry_messages import (
     MAX_WANTED,
     Digest,
     RecordEntry,
@@ -29,8 +29,9 @@ from services.registry_messages import (
     VehicleEvent,
     Wanted,
 )
-from services.session import Peer, Publication, Request
-from services.versions import Version
+from services.registering.versions import Version
+from services.wire.exchange import Publication, Request
+from services.wire.session import Peer
 
 __all__ = ["Sync"]
 

@@ -27,9 +27,9 @@ from configspace.space import PermissibleSpace
 from configspace.vehicle import Vehicle
 from configspace.vehicle_io import parse_vehicle
 from services.errors import CODES, InvalidMessage, RegistrationRefused, StoreError
-from services.keys import checked_chunk
-from services.store import Record, VehicleStore
-from services.versions import Clock, Version
+from services.protocol.keys import checked_chunk
+from services.registering.store import Record, VehicleStore
+from services.registering.versions import Clock, Version
 
 __all__ = ["ABSENT", "Change", "Registry", "Snapshot"]
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from configspace.errors import InvalidInput, Problem
-from services.access import Roles, access_control, servers_only
-from services.certificates import Side, checked_name, is_open_to_all
-from services.endpoint import Endpoint
 from services.errors import InvalidEndpoint
-from services.keys import Keys
+from services.guarding.access import Roles, access_control, servers_only
+from services.guarding.certificates import Side, checked_name, is_open_to_all
+from services.protocol.endpoint import Endpoint
+from services.protocol.keys import Keys
 
 __all__ = [
     "Roles",

@@ -13,8 +13,8 @@ import threading
 from collections.abc import Callable
 
 from services.errors import ServiceError
-from services.keys import Keys
-from services.session import Peer
+from services.protocol.keys import Keys
+from services.wire.session import Peer
 
 __all__ = ["Presence"]
 

@@ -23,14 +23,16 @@ from omniplan.batch.many import SCHEMA, require_names
 from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
 from omniplan.trajectory import Trajectory, timed
-from services.arrow_motions import table_of_twists
-from services.asking import Asker
-from services.batch_client import Part, Progress, asked, questions_of, slices_of
-from services.batch_messages import BatchTwistsRequest, BatchValidateRequest
-from services.endpoint import DEFAULT_ENDPOINT, Endpoint
+from services.asking.asker import Asker
+from services.asking.batch_client import Part, Progress, asked, questions_of, slices_of
+from services.asking.sheet_cache import SheetCache
 from services.errors import ServiceError, ServiceUnreachable
-from services.keys import Keys, Route
-from services.messages import (
+from services.guarding.security import Security, check_endpoint, zenoh_entries
+from services.protocol.arrow_motions import table_of_twists
+from services.protocol.batch_messages import BatchTwistsRequest, BatchValidateRequest
+from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import (
     Health,
     Question,
     SelectReply,
@@ -41,14 +43,12 @@ from services.messages import (
     decode,
     encode,
 )
-from services.registry_messages import (
+from services.registering.registry_messages import (
     RegisterReply,
     RegisterRequest,
     UnregisterRequest,
 )
-from services.security import Security, check_endpoint, zenoh_entries
-from services.session import Stop
-from services.sheet_cache import SheetCache
+from services.wire.exchange import Stop
 
 __all__ = ["Client"]
 

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field
 
 from configspace.errors import InvalidInput
-from services.messages import Message
-from services.registry import Change, Snapshot
-from services.store import Record
-from services.versions import Version
+from services.protocol.messages import Message
+from services.registering.registry import Change, Snapshot
+from services.registering.store import Record
+from services.registering.versions import Version
 
 __all__ = [
     "Digest",

@@ -14,7 +14,7 @@ import time
 from collections import OrderedDict
 
 from services.errors import CallStopped
-from services.keys import checked_chunk
+from services.protocol.keys import checked_chunk
 
 __all__ = ["Call", "Calls"]
 

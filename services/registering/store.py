@@ -26,8 +26,8 @@ from types import MappingProxyType, TracebackType
 from typing import Any, Self
 
 from services.errors import StoreError
-from services.keys import checked_chunk
-from services.versions import MAX_COUNTER, Version, is_instance
+from services.protocol.keys import checked_chunk
+from services.registering.versions import MAX_COUNTER, Version, is_instance
 
 __all__ = ["Record", "VehicleStore"]
 

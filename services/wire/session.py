@@ -1,193 +1,47 @@
-"""The one importer of zenoh: sessions, requests and replies as plain values.
+"""Sessions of zenoh.
 
-Errors of zenoh become ServiceError here. Sessions are peers that talk to the given
-endpoints only: no multicast, no gossip, no shared memory, nothing read from the
-environment.
+They are peers that talk to the given endpoints only: no multicast, no gossip, no shared
+memory, nothing read from the environment.
 """
 
 from __future__ import annotations
 
 import json
-import re
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from functools import lru_cache
-from queue import Empty, SimpleQueue
-from types import TracebackType
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
-from weakref import WeakSet
 
 import zenoh
 
-from services.certificates import refusal
-from services.endpoint import Endpoint
 from services.errors import (
     ServiceError,
     ServiceRefused,
     ServiceTimeout,
     ServiceUnreachable,
 )
+from services.guarding.certificates import refusal
+from services.protocol.endpoint import Endpoint
+from services.wire.exchange import (
+    Publication,
+    Reply,
+    Request,
+    Stop,
+    Stream,
+    encoding_of,
+    published,
+    reason_of,
+    received,
+    wrapped,
+)
 
-__all__ = ["Peer", "Publication", "Reply", "Request", "Stop", "Stream"]
+__all__ = ["Peer"]
 
 AT_ONCE = 0.25
 """One of several endpoints that is there is connected to within this time, s."""
 MAX_MESSAGE = 64 * 2**20
 """A longer message ends the connection, bytes; requests end well below."""
-# Where in zenoh's sources an error arose says nothing to our users.
-# Nor do the options that it appends to an address.
-_NOISE = re.compile(r" at /[^ ]*\.rs:\d+\.?|#(?:[\w.]+=[^ ;]*;?)+(?=: )")
-
-
-class Request:
-    """One request received; use it in a ``with`` block, or the caller waits in vain."""
-
-    def __init__(self, query: zenoh.Query) -> None:
-        self._query = query
-        self.key = str(query.key_expr)
-        """What was asked; may have wildcards."""
-        payload = query.payload
-        self.n_bytes = 0 if payload is None else len(payload)
-        """Size of the payload."""
-
-    @property
-    def is_wild(self) -> bool:
-        """Whether the key has wildcards."""
-        return "*" in self.key
-
-    @property
-    def payload(self) -> bytes:
-        """The payload, copied; empty if there is none."""
-        payload = self._query.payload
-        return b"" if payload is None else payload.to_bytes()
-
-    @property
-    def encoding(self) -> str:
-        """Encoding of the payload as zenoh names it; empty if there is none."""
-        encoding = self._query.encoding
-        return "" if encoding is None else str(encoding)
-
-    def matches(self, key: str) -> bool:
-        """Return whether a concrete key was asked."""
-        return self._query.key_expr.intersects(zenoh.KeyExpr(key))
-
-    def reply(self, key: str, payload: bytes, encoding: str) -> None:
-        """Send one reply under its concrete key."""
-        with _wrapped(f"reply to {self.key}"):
-            self._query.reply(key, payload, encoding=_encoding(encoding))
-
-    def fail(self, payload: bytes, encoding: str) -> None:
-        """Send an error reply."""
-        with _wrapped(f"reply to {self.key}"):
-            self._query.reply_err(payload, encoding=_encoding(encoding))
-
-    def __enter__(self) -> Request:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        # Dropping tells the caller that there is no more to come.
-        self._query.drop()  # type: ignore[no-untyped-call]
-
-
-@dataclass(frozen=True)
-class Publication:
-    """What was put, or that a key was deleted."""
-
-    key: str
-    is_delete: bool
-    n_bytes: int
-    read: Callable[[], bytes]
-    """Returns the payload, copied."""
-
-
-@dataclass(frozen=True)
-class Reply:
-    """One reply received."""
-
-    is_error: bool
-    payload: bytes
-    encoding: str
-
-    @property
-    def is_timeout(self) -> bool:
-        """Whether it is zenoh's own word that somebody has not answered in time."""
-        return self.is_error and self.payload == b"Timeout"
-
-
-class Stop:
-    """Ends questions from another thread; one may be given to many."""
-
-    def __init__(self) -> None:
-        self.token = zenoh.CancellationToken()
-        """For questions whose replies zenoh itself keeps.
-
-        Where they go to a function of ours, zenoh waits until that has returned, and
-        was seen to wait for ever.
-        """
-        self._ended: WeakSet[Stream | Stop] = WeakSet()
-        self._lock = threading.Lock()
-        self._event = threading.Event()
-
-    @property
-    def is_set(self) -> bool:
-        """Whether nobody waits for an answer any longer."""
-        return self._event.is_set()
-
-    def set(self) -> None:
-        """End the questions: they look as if nobody had more to say."""
-        with self._lock:
-            self._event.set()
-            ended = list(self._ended)
-        for one in ended:
-            one.set()
-        self.token.cancel()  # type: ignore[no-untyped-call]
-
-    def ends(self, other: Stream | Stop) -> None:
-        """Let it end a stream, or what another one ends, too."""
-        with self._lock:
-            self._ended.add(other)
-        if self.is_set:
-            other.set()
-
-    def wait(self, timeout: float) -> bool:
-        """Wait until it is set, or for so many seconds; return whether it is."""
-        return self._event.wait(timeout)
-
-
-class Stream:
-    """The replies to one question in their order, as they come."""
-
-    def __init__(self) -> None:
-        self._replies: SimpleQueue[Reply | None] = SimpleQueue()
-
-    def receive(self, timeout: float) -> Reply | None:
-        """Return the next reply; None if there are no more.
-
-        Raises
-        ------
-        TimeoutError
-            If neither is known in time, s.
-        """
-        try:
-            return self._replies.get(timeout=timeout)
-        except Empty:
-            raise TimeoutError from None
-
-    def put(self, reply: Reply) -> None:
-        """Add a reply."""
-        self._replies.put(reply)
-
-    def set(self) -> None:
-        """Add the end."""
-        self._replies.put(None)
 
 
 class Peer:
@@ -212,7 +66,7 @@ class Peer:
         ----------
         endpoint : Endpoint
         entries : mapping, optional
-            More of zenoh's configuration, as of `services.security.zenoh_entries`.
+            More of zenoh's configuration, as of `zenoh_entries`.
         peers : sequence of Endpoint, optional
             Others to connect to whenever they are there; none has to be.
 
@@ -232,7 +86,7 @@ class Peer:
                 )
             )
         except zenoh.ZError as error:
-            reason = _reason(error)
+            reason = reason_of(error)
             if "Address already in use" in reason:
                 reason = "the port is in use"
             raise ServiceError(f"cannot listen at {endpoint}: {reason}") from error
@@ -256,7 +110,7 @@ class Peer:
         patience : float, s
             How long to try again while nobody listens there; 0: try once.
         entries : mapping, optional
-            More of zenoh's configuration, as of `services.security.zenoh_entries`.
+            More of zenoh's configuration, as of `zenoh_entries`.
 
         Raises
         ------
@@ -279,7 +133,7 @@ class Peer:
         try:
             session = zenoh.open(config)
         except zenoh.ZError as error:
-            reason = _reason(error)
+            reason = reason_of(error)
             refused = refusal(reason)
             if refused is not None:
                 raise ServiceRefused(str(endpoint), refused) from error
@@ -328,7 +182,7 @@ class Peer:
                 **(entries or {}),
             },
         )
-        with _wrapped("connect"):
+        with wrapped("connect"):
             peer = cls(zenoh.open(config), endpoints[0])
         if not peer.wait_until_met(max(patience, min(timeout, AT_ONCE))):
             try:
@@ -364,7 +218,7 @@ class Peer:
 
     def serve(self, key: str, receive: Callable[[Request], None]) -> None:
         """Pass every request below a key expression to `receive`; it must not block."""
-        with _wrapped(f"serve {key}"):
+        with wrapped(f"serve {key}"):
             queryable = self._session.declare_queryable(
                 key, lambda query: receive(Request(query)), complete=True
             )
@@ -375,23 +229,23 @@ class Peer:
 
         It goes when the session does.
         """
-        with _wrapped(f"announce {key}"):
+        with wrapped(f"announce {key}"):
             token = self._session.liveliness().declare_token(key)
         return self._declare(token)
 
     def publish(self, key: str, payload: bytes, encoding: str) -> None:
         """Send to all who follow a key; waits while the way to one of them is full."""
-        with _wrapped(f"publish {key}"):
+        with wrapped(f"publish {key}"):
             self._session.put(
                 key,
                 payload,
-                encoding=_encoding(encoding),
+                encoding=encoding_of(encoding),
                 congestion_control=zenoh.CongestionControl.BLOCK,
             )
 
     def erase(self, key: str) -> None:
         """Publish that a key is deleted."""
-        with _wrapped(f"erase {key}"):
+        with wrapped(f"erase {key}"):
             self._session.delete(key, congestion_control=zenoh.CongestionControl.BLOCK)
 
     def follow(
@@ -401,10 +255,10 @@ class Peer:
 
         It must not block.
         """
-        with _wrapped(f"follow {key}"):
+        with wrapped(f"follow {key}"):
             subscriber = self._session.declare_subscriber(
                 key,
-                lambda sample: receive(_published(sample)),
+                lambda sample: receive(published(sample)),
                 allowed_origin=zenoh.Locality.REMOTE,
             )
         return self._declare(subscriber)
@@ -421,7 +275,7 @@ class Peer:
         notice : callable
             Is given the key of a token and whether it is there; must not block.
         """
-        with _wrapped(f"watch {key}"):
+        with wrapped(f"watch {key}"):
             subscriber = self._session.liveliness().declare_subscriber(
                 key,
                 lambda sample: notice(
@@ -433,7 +287,7 @@ class Peer:
 
     def withdraw(self) -> None:
         """Receive no more requests; those received can still be answered."""
-        with _wrapped("withdraw"):
+        with wrapped("withdraw"):
             while self._declared:
                 self._declared.pop().undeclare()
 
@@ -444,11 +298,11 @@ class Peer:
 
         Error replies, and answers that do not come in time, are left out.
         """
-        with _wrapped(f"ask {key}"):
+        with wrapped(f"ask {key}"):
             channel = self._session.get(
                 key,
                 payload=payload,
-                encoding=_encoding(encoding),
+                encoding=encoding_of(encoding),
                 timeout=timeout,
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -493,17 +347,17 @@ class Peer:
             If somebody is there and does not answer in time.
         """
         replies = []
-        with _wrapped(f"ask {key}"):
+        with wrapped(f"ask {key}"):
             channel = self._session.get(
                 key,
                 payload=payload,
-                encoding=None if payload is None else _encoding(encoding),
+                encoding=None if payload is None else encoding_of(encoding),
                 timeout=timeout,
                 target=zenoh.QueryTarget.ALL if everyone else None,
                 cancellation_token=None if stop is None else stop.token,
             )
             for reply in channel:
-                replies.append(_received(reply))
+                replies.append(received(reply))
                 if first and not replies[-1].is_error:
                     break
         # zenoh reports its own timeout as an error reply that is no JSON.
@@ -527,14 +381,14 @@ class Peer:
         stop.ends(stream)
         # zenoh's annotations leave open what the callback is given.
         receive: Any = zenoh.handlers.Callback(
-            lambda reply: stream.put(_received(reply)), stream.set
+            lambda reply: stream.put(received(reply)), stream.set
         )
-        with _wrapped(f"ask {key}"):
+        with wrapped(f"ask {key}"):
             self._session.get(
                 key,
                 receive,
                 payload=payload,
-                encoding=_encoding(encoding),
+                encoding=encoding_of(encoding),
                 timeout=timeout,
                 # Otherwise all replies but the last of a key are left out.
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -546,7 +400,7 @@ class Peer:
 
     def tell(self, key: str, timeout: float) -> None:
         """Ask all servers and let nobody wait for the answer."""
-        with _wrapped(f"tell {key}"):
+        with wrapped(f"tell {key}"):
             self._session.get(
                 key, lambda _: None, timeout=timeout, target=zenoh.QueryTarget.ALL
             )
@@ -559,7 +413,7 @@ class Peer:
             if sample.kind == zenoh.SampleKind.PUT:
                 seen.set()
 
-        with _wrapped(f"wait for {key}"):
+        with wrapped(f"wait for {key}"):
             subscriber = self._session.liveliness().declare_subscriber(
                 key, notice, history=True
             )
@@ -570,7 +424,7 @@ class Peer:
 
     def close(self) -> None:
         """End the session."""
-        with _wrapped("close the session"):
+        with wrapped("close the session"):
             self._session.close()  # type: ignore[no-untyped-call]
 
     def _declare(self, thing: Any) -> Callable[[], None]:
@@ -580,7 +434,7 @@ class Peer:
         def undeclare() -> None:
             with suppress(ValueError):  # withdrawn already
                 self._declared.remove(thing)
-                with _wrapped("undeclare"):
+                with wrapped("undeclare"):
                     thing.undeclare()
 
         return undeclare
@@ -635,38 +489,3 @@ def _explain(
             return
     kind = ServiceRefused if is_refused else ServiceUnreachable
     raise kind("any of several addresses", "; ".join(reasons))
-
-
-@lru_cache(maxsize=64)
-def _encoding(text: str) -> zenoh.Encoding:
-    return zenoh.Encoding(text)
-
-
-@contextmanager
-def _wrapped(doing: str) -> Iterator[None]:
-    """Turn zenoh's errors into ServiceError."""
-    try:
-        yield
-    except zenoh.ZError as error:
-        raise ServiceError(f"cannot {doing}: {_reason(error)}") from error
-
-
-def _reason(error: zenoh.ZError) -> str:
-    return _NOISE.sub("", str(error))[:500]
-
-
-def _published(sample: zenoh.Sample) -> Publication:
-    is_delete = sample.kind == zenoh.SampleKind.DELETE
-    payload = sample.payload
-    return Publication(
-        str(sample.key_expr), is_delete, len(payload), lambda: payload.to_bytes()
-    )
-
-
-def _received(reply: zenoh.Reply) -> Reply:
-    ok = reply.ok
-    if ok is not None:
-        return Reply(False, ok.payload.to_bytes(), str(ok.encoding))
-    # A reply is one or the other.
-    error: Any = reply.err
-    return Reply(True, error.payload.to_bytes(), str(error.encoding))

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from services.messages import JSON
+from services.protocol.messages import JSON
 
 __all__ = ["Answer", "Parts"]
 

@@ -6,15 +6,15 @@ import logging
 from types import TracebackType
 
 from configspace.errors import InvalidVehicle, Problem
-from services.keys import Keys, Route
-from services.messages import JSON, ErrorReply, decode, encode
-from services.registry import Registry
-from services.registry_messages import (
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import JSON, ErrorReply, decode, encode
+from services.registering.registry import Registry
+from services.registering.registry_messages import (
     RegisterReply,
     RegisterRequest,
     UnregisterRequest,
 )
-from services.session import Publication, Request
+from services.wire.exchange import Publication, Request
 
 __all__ = ["PutRequest", "change"]
 

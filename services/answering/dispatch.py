@@ -12,15 +12,15 @@ import logging
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 
-from services.calls import Call, Calls
-from services.cores import share_cores
+from services.answering.calls import Call, Calls
+from services.answering.cores import share_cores
+from services.answering.handlers import Answer, Handlers, Parts, check_size, error_reply
+from services.answering.metrics import Metrics
+from services.answering.workers import PoolLimits, WorkerPool
 from services.errors import CODES, CallStopped, InvalidMessage, ServiceError
-from services.handlers import Answer, Handlers, Parts, check_size, error_reply
-from services.keys import Keys, Route
-from services.messages import JSON, CancelReply, ErrorReply, encode
-from services.metrics import Metrics
-from services.session import Request
-from services.workers import PoolLimits, WorkerPool
+from services.protocol.keys import Keys, Route
+from services.protocol.messages import JSON, CancelReply, ErrorReply, encode
+from services.wire.exchange import Request
 
 __all__ = ["Dispatcher", "estimated_time"]
 

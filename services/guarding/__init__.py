@@ -1,0 +1,1 @@
+"""Who may ask what: certificates, roles, zenoh's access control."""

@@ -1,0 +1,1 @@
+"""What is said: keys, messages in JSON and Arrow, addresses."""

@@ -1,0 +1,1 @@
+"""Which vehicles there are: kept, versioned, shared among servers."""
