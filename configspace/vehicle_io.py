@@ -31,7 +31,13 @@ from configspace.vehicle import (
     Vehicle,
 )
 
-__all__ = ["catalog", "load_vehicle", "parse_vehicle", "vehicle_schema"]
+__all__ = [
+    "catalog",
+    "load_vehicle",
+    "parse_vehicle",
+    "parse_yaml",
+    "vehicle_schema",
+]
 
 _WHEELS: dict[str, type[BaseModel]] = {
     "steered": SteeredWheel,
@@ -118,7 +124,7 @@ def parse_vehicle(text: str, subject: str = "vehicle") -> Vehicle:
     InvalidVehicle
         With every mistake of the text, each with its path.
     """
-    return vehicle_from_data(_parse_yaml(text, subject), subject)
+    return vehicle_from_data(parse_yaml(text, subject), subject)
 
 
 def vehicle_from_data(data: object, subject: str = "vehicle") -> Vehicle:
@@ -173,7 +179,14 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _parse_yaml(text: str, subject: str) -> object:
+def parse_yaml(text: str, subject: str) -> object:
+    """Return the plain data of YAML or JSON text.
+
+    Raises
+    ------
+    InvalidVehicle
+        With the place of the first mistake.
+    """
     try:
         return yaml.load(text, Loader=_Loader)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
