@@ -132,6 +132,13 @@ def _draw(
         MultipleLocator(look.step) if look.step else MaxNLocator(5, steps=[1, 2, 5, 10])
     )
     axes.zaxis.set_major_locator(locator)
+    # Where two axes meet their last labels must not: each is led away from the corner.
+    for text in axes.get_xticklabels():
+        text.set_horizontalalignment("right")
+    for text in axes.get_yticklabels():
+        text.set_horizontalalignment("left")
+    for text in axes.get_zticklabels():
+        text.set(horizontalalignment="left", verticalalignment="bottom")
     axes.set_box_aspect((1.0, 1.15, look.rise), zoom=0.95)
     axes.view_init(elev=look.elevation, azim=look.azimuth)
 

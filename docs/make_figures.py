@@ -17,6 +17,9 @@ from configspace.plot import (
 )
 from omniplan import select
 from omniplan.demo import DEMO_FLEET, draw, manoeuvres
+from omniplan.plots.animation import save_animation
+from omniplan.plots.plans import plot_plans
+from omniplan.scenarios import SCENARIOS, solve_all
 
 FOLDER = Path(__file__).parent / "figures"
 TILE_GRID = Grid(160, 288)
@@ -40,9 +43,19 @@ def catalogue() -> Any:
     return plot_catalog([build_space(v, TILE_GRID, cache=False) for v in vehicles])
 
 
+def scenarios() -> None:
+    """Draw the plans of all scenarios, and a film of figure 1 of the paper."""
+    for task in SCENARIOS:
+        solutions = list(solve_all(task))
+        save_figure(plot_plans(solutions, task.title), FOLDER / f"{task.name}.png")
+        if task.name == "parking":
+            save_animation(solutions, FOLDER / "parking.gif", task.title)
+
+
 if __name__ == "__main__":
     fleet = [build_space(load_vehicle(name)) for name in DEMO_FLEET]
     draw(select(manoeuvres(), fleet), FOLDER, Console(stderr=True))
     for name, figure in paper_figures():
         save_figure(figure, FOLDER / f"{name}.png")
     save_figure(catalogue(), FOLDER / "catalog.png")
+    scenarios()

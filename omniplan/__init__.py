@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     )
     from omniplan.inputs.files import read_trajectories, write_trajectories
     from omniplan.judging.rows import Tolerances
+    from omniplan.obstacles import CollisionChecker, Obstacles
+    from omniplan.optimising.improving import optimise
     from omniplan.path import Path
+    from omniplan.planning.planner import plan
     from omniplan.planning.result import Plan, PlanStatus
     from omniplan.plots.pictures import plot_report
     from omniplan.report import Advice, Candidate, Ranking, Report, Violation
@@ -37,11 +40,13 @@ if TYPE_CHECKING:
 __all__ = [
     "Advice",
     "Candidate",
+    "CollisionChecker",
     "Fault",
     "FleetVehicle",
     "InvalidTrajectory",
     "NoPlanFound",
     "NotDrivable",
+    "Obstacles",
     "OptimisationFailed",
     "Path",
     "Plan",
@@ -63,7 +68,9 @@ __all__ = [
     "check_twists",
     "fastest",
     "margins",
+    "optimise",
     "parse_requirement",
+    "plan",
     "plot_report",
     "read_trajectories",
     "select",
@@ -76,11 +83,13 @@ __all__ = [
 ]
 
 _HOMES = {
+    "CollisionChecker": "obstacles",
     "Fault": "choosing.faults",
     "FleetVehicle": "choosing.fitness",
     "InvalidTrajectory": "errors",
     "NoPlanFound": "errors",
     "NotDrivable": "errors",
+    "Obstacles": "obstacles",
     "OptimisationFailed": "errors",
     "Path": "path",
     "Plan": "planning.result",
@@ -99,7 +108,9 @@ _HOMES = {
     "check_twists": "batch.twists",
     "fastest": "timing.fastest",
     "margins": "trace",
+    "optimise": "optimising.improving",
     "parse_requirement": "choosing.requirements",
+    "plan": "planning.planner",
     "plot_report": "plots.pictures",
     "read_trajectories": "inputs.files",
     "select": "choosing.fleet",

@@ -16,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from omniplan.shell import answers, loading
+from omniplan.shell import answers, loading, planning
 from omniplan.shell.answers import BAD_INPUT, FAILURE, NO, YES
 
 if TYPE_CHECKING:
@@ -117,6 +117,10 @@ def _parser() -> argparse.ArgumentParser:
         "vehicles of one type apart",
     )
     _ranking_arguments(select)
+
+    planning.add_arguments(
+        command("plan", planning.plan, "find a trajectory among obstacles")
+    )
 
     serve = command("serve", _serve, "answer questions about a fleet over zenoh")
     _serve_arguments(serve)
@@ -514,7 +518,7 @@ def _query(options: argparse.Namespace) -> int:
             answers.print_json(names) if options.json else print("\n".join(names))
         elif options.what == "sheet":
             client.space(options.vehicle).save(options.output)
-            answers.say(f"wrote {options.output}", options.json)
+            answers.say_written(options.output, options.json)
         elif options.what == "check":
             trajectories = loading.trajectories_of(options.trajectories, None)
             allow = options.allow_unreachable
@@ -548,7 +552,10 @@ def _query_many(client: Client, options: argparse.Namespace) -> int:
     from configspace import OmniplanError
 
     trajectories = loading.trajectories_of(options.trajectories, None)
-    with Progress(console=answers.progress_console(), transient=True) as bar:
+    console = answers.progress_console()
+    # Where nobody watches even an invisible bar ends with a blank line.
+    is_hidden = not console.is_terminal
+    with Progress(console=console, transient=True, disable=is_hidden) as bar:
         task = bar.add_task("Judging", total=None)
         table = client.validate_many(
             trajectories,
@@ -577,10 +584,7 @@ def _export(options: argparse.Namespace) -> int:
         from configspace.mesh import export
 
         export(space.to_mesh(), options.output)
-    if options.json:
-        answers.print_json({"output": str(options.output)})
-    else:
-        print(f"wrote {options.output}")
+    answers.say_written(options.output, options.json)
     return YES
 
 

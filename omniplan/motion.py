@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -22,8 +23,10 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from configspace import Vehicle, exact_v_max
+from configspace.angles import wrap
 from configspace.exact import active_rows
 from configspace.limits import rows_of
+from configspace.vehicle import SteerableWheel
 from omniplan.judging.swing import Directions, Swing, directions_of_legs, factored
 from omniplan.samples import HEADING_LENGTH
 from omniplan.trajectory import Trajectory
@@ -90,6 +93,10 @@ class Enclosure:
     """Bound on |v̈|, per s²."""
     omega_ddot: FloatArray
     """Bound on |ω̈|, per s²."""
+    v_dddot: FloatArray
+    """Bound on |v⃛|, per s³."""
+    omega_dddot: FloatArray
+    """Bound on |ω⃛|, per s³."""
     scale0: FloatArray
     scale1: FloatArray
     scale_high: FloatArray
@@ -98,6 +105,26 @@ class Enclosure:
     """Sign of v_s of the configuration that is meant (omni_curve), else 1."""
     swing: Swing | None = None
     """How directions swing; None where the twist may bend without bound."""
+
+    def merged(self, others: Enclosure, order: IntArray) -> Enclosure:
+        """Return parts of both: these and then the others, in a new order.
+
+        Parameters
+        ----------
+        others : Enclosure
+            Of the same motion.
+        order : (n,) int
+            Indices into all of them.
+        """
+        swing = self.swing
+        if swing is not None and others.swing is not None:
+            swing = swing.merged(others.swing, order)
+        fields = {
+            name: np.concatenate([values, getattr(others, name)])[order]
+            for name, values in vars(self).items()
+            if name != "swing"
+        }
+        return Enclosure(**fields, swing=swing)
 
 
 class Motion(Protocol):
@@ -216,9 +243,37 @@ class PoseMotion:
             run = slice(first, last + 1)
             ends = bool(stop[first]), bool(stop[last])
             part = slice(first, last)
-            x, y = (spline(t[run], samples[run, i], *ends) for i in (0, 1))
+            x, y, heading = np.moveaxis(spline(t[run], samples[run], *ends), 2, 0)
             self.position[:, part] = x + 1j * y
-            self.heading[:, part] = spline(t[run], samples[run, 2], *ends)
+            self.heading[:, part] = heading
+
+    @cached_property
+    def since(self) -> FloatArray:
+        """(n - 1,) s: how long after a rest intervals start, negative before it.
+
+        Of those over which the twist is nearly a multiple of that time: it leaves less
+        change, relative to its size, if divided by it. Elsewhere infinite.
+        """
+        t, middle = self.t, (self.t[1:] + self.t[:-1]) / 2
+        _, p1, p2, _ = _polynomial(
+            self.position, np.arange(t.size - 1), middle - t[:-1]
+        )
+        _, h1, h2, _ = _polynomial(self.heading, np.arange(t.size - 1), middle - t[:-1])
+
+        def change(rest: FloatArray) -> FloatArray:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                pull = 1 / (middle - rest)
+                left = np.abs(p2 - p1 * pull) + HEADING_LENGTH * np.abs(h2 - h1 * pull)
+            return np.where(np.isfinite(left), left, np.inf)
+
+        if self.rest is None:
+            return np.full(middle.shape, np.inf)
+        before = np.maximum.accumulate(np.where(self.rest[0], t[:-1], -np.inf))
+        after = np.minimum.accumulate(np.where(self.rest[1], t[1:], np.inf)[::-1])[::-1]
+        after = np.where(np.isfinite(after), after, -np.inf)
+        options = np.stack([np.full(middle.shape, -np.inf), before, after])
+        least = np.argmin([change(rest) for rest in options], axis=0)
+        return np.asarray(t[:-1] - np.take_along_axis(options, least[None], axis=0)[0])
 
     def intervals(self) -> Intervals:
         """Return the intervals between the samples."""
@@ -257,21 +312,28 @@ class PoseMotion:
         p1 = p1 + dt**2 / 8 * p3
         h1 = h1 + dt**2 / 8 * h3
         # d²/dt² (e^{-jθ} p') = e^{-jθ} (p''' - 2jθ'p'' - jθ''p' - θ'²p')
-        v_ddot = p3 + 2 * h1 * p2 + h2 * p1 + h1**2 * p1 + h3 * abs(self.point)
-        one = np.ones_like(dt)
+        turn2, turn3 = h2 + h1**2, h3 + 3 * h1 * h2 + h1**3  # of |dᵏ/dtᵏ e^{-jθ}|
+        v_ddot = p3 + 2 * h1 * p2 + turn2 * p1 + h3 * abs(self.point)
+        v_dddot = 3 * h1 * p3 + 3 * turn2 * p2 + turn3 * p1
+        one, zero = np.ones_like(dt), np.zeros_like(dt)
         ends = v0, v1, o0, o1, vd0, vd1, od0, od1
+        bends = v_ddot, h3, v_dddot, zero
         swing = self._swing(parts)
-        return Enclosure(dt, *ends, v_ddot, h3, one, one, one, one, swing)
+        return Enclosure(dt, *ends, *bends, one, one, one, one, swing)
 
     def _swing(self, parts: Intervals) -> Swing:
         k = parts.knot
         start, span = self.t[k], self.t[k + 1] - self.t[k]
         rest = None if self.rest is None else self.rest[:, k]
+        since = self.since[k]
+        if rest is not None:
+            since = np.where(rest.any(axis=0), np.inf, since)
         return Swing(
             dt=parts.t1 - parts.t0,
             h=np.stack([parts.t0 - start, parts.t1 - start]),
-            speed=factored(self.position[:, k], span, rest),
-            turn=factored(self.heading[:, k], span, rest),
+            speed=factored(self.position[:, k], span, rest, since),
+            turn=factored(self.heading[:, k], span, rest, since),
+            since=since,
             heading=self.heading[:, k],
             point=self.point,
         )
@@ -317,8 +379,7 @@ class TwistMotion:
             v_dot,
             omega_dot,
             omega_dot,
-            zero,
-            zero,
+            *(zero, zero, zero, zero),
             one,
             one,
             one,
@@ -331,6 +392,9 @@ class OmniCurveMotion:
 
     The twist enclosed is the direction (c e^{jβ}, s κ_g); the speed is a factor on it:
     |v_n| for the vehicle itself, ``|v_n| v_max`` for any other.
+
+    Attributes `t` (n,), `samples` (n, 3) with those at the kinks, `kappa_g` and the
+    point `reference` tell all of it but `owner`.
     """
 
     has_rates = False
@@ -349,30 +413,30 @@ class OmniCurveMotion:
         for column, levels in ((0, (-1.0, 1.0)), (2, (0.0,))):
             for level in levels:
                 t, samples = _with_crossings(t, samples, column, level)
-        self._t, self._samples = t, samples
-        self._kappa_g, self._reference, self._owner = kappa_g, reference, owner
+        self.t, self.samples = t, samples
+        self.kappa_g, self.reference, self._owner = kappa_g, reference, owner
         self.is_own = owner is None
 
     def intervals(self) -> Intervals:
         """Return the intervals between the samples and the kinks."""
-        return Intervals(np.arange(len(self._t) - 1), self._t[:-1], self._t[1:])
+        return Intervals(np.arange(len(self.t) - 1), self.t[:-1], self.t[1:])
 
     def enclose(self, parts: Intervals) -> Enclosure:
         """Return an enclosure of every part."""
         k = parts.knot
-        span = self._t[k + 1] - self._t[k]
-        rate = (self._samples[k + 1] - self._samples[k]) / span[:, None]
+        span = self.t[k + 1] - self.t[k]
+        rate = (self.samples[k + 1] - self.samples[k]) / span[:, None]
         at0, at1 = (
-            self._samples[k] + (t - self._t[k])[:, None] * rate
+            self.samples[k] + (t - self.t[k])[:, None] * rate
             for t in (parts.t0, parts.t1)
         )
-        middle = (self._samples[k, 0] + self._samples[k + 1, 0]) / 2
+        middle = (self.samples[k, 0] + self.samples[k + 1, 0]) / 2
         gentle = np.abs(middle) < 1
         side = np.where(middle < 0, -1.0, 1.0)
         c_dot = np.where(gentle, 0.0, -side * rate[:, 0])
         s_dot = np.where(gentle, rate[:, 0], 0.0)
-        factor = np.where(self._samples[k, 2] + self._samples[k + 1, 2] < 0, -1.0, 1.0)
-        kappa_g, offset = self._kappa_g, self._reference
+        factor = np.where(self.samples[k, 2] + self.samples[k + 1, 2] < 0, -1.0, 1.0)
+        kappa_g, offset = self.kappa_g, self.reference
         ends = []
         for at in (at0, at1):
             c = np.where(gentle, 1.0, 2 - np.abs(at[:, 0]))
@@ -383,7 +447,9 @@ class OmniCurveMotion:
             v_dot = (c_dot + 1j * rate[:, 1] * c) * e - 1j * omega_dot * offset
             ends.append((c, c * e - 1j * omega * offset, omega, v_dot, omega_dot))
         (c0, v0, o0, vd0, od0), (c1, v1, o1, vd1, od1) = ends
-        v_ddot = 2 * np.abs(c_dot * rate[:, 1]) + np.maximum(c0, c1) * rate[:, 1] ** 2
+        turn, most = np.abs(rate[:, 1]), np.maximum(c0, c1)
+        v_ddot = 2 * np.abs(c_dot) * turn + most * turn**2
+        v_dddot = 3 * np.abs(c_dot) * turn**2 + most * turn**3
         share = np.abs(at0[:, 2]), np.abs(at1[:, 2])
         dt = parts.t1 - parts.t0
         zero = np.zeros_like(dt)
@@ -393,17 +459,16 @@ class OmniCurveMotion:
             radius = dt**2 / 8 * v_ddot
             ends_ = (v0, v1, o0, o1)
             scale = _speeds(self._owner, (at0, at1), share, factor, ends_, radius)
-        return Enclosure(
-            dt, v0, v1, o0, o1, vd0, vd1, od0, od1, v_ddot, zero, *scale, factor
-        )
+        bends = v_ddot, zero, v_dddot, zero
+        return Enclosure(dt, v0, v1, o0, o1, vd0, vd1, od0, od1, *bends, *scale, factor)
 
     def directions(self, parts: Intervals) -> Directions:
         """Return how directions swing along the parts, whatever v_n is."""
         k = parts.knot
-        rate = np.diff(self._samples, axis=0)[k] / np.diff(self._t)[k][:, None]
-        since = np.stack([parts.t0, parts.t1]) - self._t[k]
-        kappa_n, beta = (self._samples[k, i] + since * rate[:, i] for i in (0, 1))
-        middle = (self._samples[k, 0] + self._samples[k + 1, 0]) / 2
+        rate = np.diff(self.samples, axis=0)[k] / np.diff(self.t)[k][:, None]
+        since = np.stack([parts.t0, parts.t1]) - self.t[k]
+        kappa_n, beta = (self.samples[k, i] + since * rate[:, i] for i in (0, 1))
+        middle = (self.samples[k, 0] + self.samples[k + 1, 0]) / 2
         gentle, side = np.abs(middle) < 1, np.where(middle < 0, -1.0, 1.0)
         return directions_of_legs(
             parts.t1 - parts.t0,
@@ -415,8 +480,8 @@ class OmniCurveMotion:
                 np.where(gentle, rate[:, 0], 0.0),
                 rate[:, 1],
             ),
-            self._kappa_g,
-            self._reference,
+            self.kappa_g,
+            self.reference,
         )
 
 
@@ -457,18 +522,48 @@ def _speeds(
             np.abs(z) if row.kind == "disc" else np.abs((z * np.exp(-1j * row.nu)).real)
         )
         rho = np.maximum(rho, size - row.p * v_reach - abs(row.b) * s_reach)
-    high = np.maximum(*share) / rho
+    high = np.where(_is_out(owner, factor, ends, radius), 0.0, np.maximum(*share) / rho)
     return share[0] * exact[0], share[1] * exact[1], high
 
 
-End: TypeAlias = Literal["not-a-knot"] | tuple[Literal[1, 2], float]
+def _is_out(
+    owner: Vehicle,
+    factor: FloatArray,
+    ends: tuple[ComplexArray, ComplexArray, FloatArray, FloatArray],
+    radius: FloatArray,
+) -> npt.NDArray[np.bool_]:
+    """Return where a wheel of the owner is out of its range all over a part.
+
+    There v_max is 0: the owner stands, and so does whoever is to do the same.
+    """
+    v0, v1, o0, o1 = ends
+    out = np.zeros(radius.shape, dtype=bool)
+    for wheel, contact in zip(owner.wheels, owner.contacts, strict=True):
+        if not isinstance(wheel, SteerableWheel) or wheel.steering_range_deg is None:
+            continue
+        least, largest = wheel.steering_range
+        half = (largest - least) / 2
+        a, b = (factor * (v + 1j * o * contact) for v, o in ((v0, o0), (v1, o1)))
+        near = np.maximum(np.abs(a), np.abs(b)) - np.abs(b - a) - radius
+        start = wrap(np.angle(a) - (least + largest) / 2)
+        end = start + np.angle(b * a.conj())
+        sizes = np.abs(start), np.abs(end)
+        aside = np.minimum(np.minimum(*sizes), 2 * np.pi - np.maximum(*sizes))
+        aside = np.where(start * end > 0, aside, 0.0)
+        spread = np.arcsin(np.clip(radius / np.maximum(near, 1e-300), 0.0, 1.0))
+        out |= (near > 0) & (aside - spread > half)
+    return out
+
+
+End: TypeAlias = Literal["not-a-knot"] | tuple[Literal[1, 2], FloatArray]
 
 
 def spline(t: FloatArray, values: FloatArray, rest0: bool, rest1: bool) -> FloatArray:
-    """Return cubic coefficients (4, n - 1); at rest where asked."""
+    """Return cubic coefficients (4, n - 1, ...) of (n, ...); at rest where asked."""
+    still = np.zeros(values.shape[1:])
     # Without a fourth sample there is no third derivative to keep: natural ends.
-    free: End = "not-a-knot" if len(t) > 3 else (2, 0.0)
-    rest: End = (1, 0.0)
+    free: End = "not-a-knot" if len(t) > 3 else (2, still)
+    rest: End = (1, still)
     ends: Any = (rest if rest0 else free, rest if rest1 else free)
     return np.asarray(CubicSpline(t, values, bc_type=ends).c)
 

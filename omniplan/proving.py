@@ -41,6 +41,8 @@ class Proved:
     tolerances: Tolerances
     parts: Parts
     choice: Choice
+    first: Parts
+    """The intervals between the samples, uncut."""
 
 
 def prove(
@@ -50,6 +52,7 @@ def prove(
     *,
     allow_unreachable: bool = False,
     longest: float | None = None,
+    max_parts: int | None = None,
 ) -> Proved:
     """Return the parts of a trajectory as `validate` judges them.
 
@@ -61,12 +64,15 @@ def prove(
     allow_unreachable : bool
     longest : float, s, optional
         No part is longer than this.
+    max_parts : int, optional
+        How many more parts than samples there may be; more limits may stay undecided.
     """
     tolerances = tolerances or Tolerances()
     motion = motion_of(trajectory, is_own=is_own(trajectory, space))
     judge = judge_for(space, motion, tolerances)
-    proof = Proof(motion, judge, tolerances)
+    proof = Proof(motion, judge, tolerances, max_parts)
     proof.decide()
+    proof.separate()
     choice = choose_configurations(
         proof, judge, space, tolerances, allow_unreachable=allow_unreachable
     )
@@ -75,7 +81,8 @@ def prove(
         proof.refine(lambda parts: parts.spans.t1 - parts.spans.t0 > longest)
         proof.refine(_loose(choice), LOOSE_HALVINGS)
     parts = _followed(proof, choice, judge, tolerances)
-    return Proved(trajectory, space, motion, judge, tolerances, parts, choice)
+    first = proof.first
+    return Proved(trajectory, space, motion, judge, tolerances, parts, choice, first)
 
 
 def _followed(

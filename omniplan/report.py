@@ -61,6 +61,9 @@ class Violation:
     scale: float | None = None
     """What the excess is relative to, in `unit`: half the range of a steering angle;
     None: the bound itself."""
+    excess_at_samples: float | None = None
+    """Largest `excess` at the samples themselves within the stretch, 0 if the limit is
+    broken between them only; None where that was not told apart."""
 
     @property
     def excess(self) -> float:
@@ -131,9 +134,19 @@ class Report:
     def headline(self) -> Violation | None:
         """The most telling violation, None if valid.
 
-        Proved ones first, then what no other speed would mend, then the largest excess.
+        Proved ones first, then what no other speed would mend, then the largest excess
+        at the samples: that does not depend on where motions are cut to prove limits.
+        Excesses that differ by rounding only are a tie: the first limit and wheel by
+        name are told then, and the earliest place.
         """
-        return min(self.violations, key=_telling, default=None)
+        if not self.violations:
+            return None
+        rank = min(map(_rank, self.violations))
+        alike = [v for v in self.violations if _rank(v) == rank]
+        most = max(map(_told_excess, alike))
+        least = most if math.isinf(most) else most - TIE * (1 + most)
+        tied = [v for v in alike if _told_excess(v) >= least]
+        return min(tied, key=lambda v: (v.limit, v.wheel or "", v.t))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as plain data (JSON types only)."""
@@ -198,9 +211,18 @@ SHAPE_LIMITS = (
 """Limits of the configuration, which driving slower does not mend."""
 
 
-def _telling(violation: Violation) -> tuple[bool, int, float, float]:
+TIE = 1e-9
+"""Excesses that differ by less, relative to the utilisation, are alike."""
+
+
+def _rank(violation: Violation) -> tuple[bool, int]:
     order = (*SHAPE_LIMITS, violation.limit).index(violation.limit)
-    return (not violation.is_proved, order, -violation.excess, violation.t)
+    return not violation.is_proved, order
+
+
+def _told_excess(violation: Violation) -> float:
+    at_samples = violation.excess_at_samples
+    return violation.excess if at_samples is None else at_samples
 
 
 _REPORT: TypeAdapter[Report] = TypeAdapter(Report)

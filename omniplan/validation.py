@@ -28,13 +28,13 @@ from omniplan.judging.violations import (
 )
 from omniplan.motion import Motion, PoseMotion
 from omniplan.path import Path
-from omniplan.proving import prove
+from omniplan.proving import Proved, prove
 from omniplan.report import Advice, Report
 from omniplan.side_step import side_step
 from omniplan.standing.standstill import Choice
 from omniplan.trajectory import Trajectory, timed
 
-__all__ = ["Tolerances", "judged", "validate"]
+__all__ = ["Tolerances", "judged", "report_of", "validate"]
 
 MIN_FACTOR, MAX_FACTOR = 0.01, 100.0
 """Slower or faster than this nothing is promised."""
@@ -128,11 +128,23 @@ def judged(
     allow_unreachable : bool
         As for `validate`.
     """
-    proved = prove(trajectory, space, tolerances, allow_unreachable=allow_unreachable)
+    return report_of(
+        prove(trajectory, space, tolerances, allow_unreachable=allow_unreachable)
+    )
+
+
+def report_of(proved: Proved) -> Report:
+    """Sum up the proof of a trajectory; the speed factor is what the margins promise.
+
+    Parameters
+    ----------
+    proved : Proved
+    """
+    trajectory, space = proved.trajectory, proved.space
     motion, judge = proved.motion, proved.judge
     parts, choice = proved.parts, proved.choice
     violations = [
-        *find_violations(parts, choice, judge, trajectory, motion, space),
+        *find_violations(parts, proved.first, choice, judge, trajectory, motion, space),
         *reconfiguration_violations(choice, judge, trajectory, motion, space),
         *unreachable_violations(choice, judge, trajectory, motion, space),
     ]
@@ -217,7 +229,8 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
     if swings and not isinstance(motion, PoseMotion):
         yield "max_steering_acceleration_deg (samples other than poses bend suddenly)"
     if motion.has_rates:
-        if any(
+        # Poses alone swing smoothly: see `judging.beside.beside_gain`.
+        if not isinstance(motion, PoseMotion) and any(
             w.max_acceleration is not None and (any(w.offsets) or w.steering_coupling)
             for w in steered
         ):

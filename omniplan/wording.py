@@ -102,12 +102,14 @@ def quantity(value: float, unit: str) -> str:
     return f"{value:.3f} {unit}"
 
 
-def report_lines(report: Report) -> Iterator[str]:
+def report_lines(report: Report, *, is_timed: bool = False) -> Iterator[str]:
     """Yield a report as lines of text.
 
     Parameters
     ----------
     report : Report
+    is_timed : bool
+        Whether it is of a path that was given its times by `fastest`.
     """
     verdict = "permitted" if report.valid else "not permitted"
     yield f"{report.trajectory} by {report.vehicle}: {verdict}"
@@ -119,7 +121,7 @@ def report_lines(report: Report) -> Iterator[str]:
         yield f"  advice: {advice.text}"
     if report.valid:
         yield (
-            f"  {report.duration:.2f} s as given, at best "
+            f"  {report.duration:.2f} s as {'timed' if is_timed else 'given'}, at best "
             f"{report.fastest_duration:.2f} s (factor {report.speed_factor:.2f}); "
             f"margin {report.margin:.1%} ({report.tightest})"
         )

@@ -90,6 +90,8 @@ def whole_uses(sim: Simulation) -> Iterator[Use]:
             later = sim.velocity_later(*sim.places[i])
             gain = rolling_of(sim.vehicle, i, later) - rolling_of(sim.vehicle, i, u)
             rate = np.abs(gain) / sim.moment
+            if is_beside(wheel) and sim.ahead is not None:  # see `steering_uses`
+                rate = np.where(sim.moves, 0.0, rate)
             limit = "WHEEL_ACCELERATION"
             yield use(limit, wheel.id, rate, wheel.max_acceleration, sim.t)
         if isinstance(wheel, FixedWheel):
@@ -106,6 +108,12 @@ def offsets_of(wheel: object) -> tuple[float, ...]:
         case Turntable():
             return (wheel.track / 2, -wheel.track / 2)
     return (0.0,)
+
+
+def is_beside(wheel: object) -> bool:
+    """Whether steering takes part in what a wheel's motor does."""
+    coupling = getattr(wheel, "steering_coupling", 0.0)
+    return any(offsets_of(wheel)) or coupling > 0
 
 
 def slip_allowed(sim: Simulation) -> FloatArray:
@@ -202,7 +210,7 @@ def piece_uses(sim: Simulation, piece: Piece, sign: int) -> Iterator[Use]:
         if wheel.steering_range_deg is not None:
             off, half = off_middle(wheel, alpha)
             yield use("STEER_RANGE", wheel.id, off, half, t)
-        yield from steering_uses(sim, i, wheel, piece, alpha)
+        yield from steering_uses(sim, i, wheel, piece, alpha, sign)
         if wheel.max_speed is None:
             continue
         shared = wheel.steering_coupling * np.abs(sim.turning(i))
@@ -225,9 +233,14 @@ def off_middle(wheel: SteerableWheel, alpha: FloatArray) -> tuple[FloatArray, fl
 
 
 def steering_uses(
-    sim: Simulation, i: int, wheel: SteerableWheel, piece: Piece, alpha: FloatArray
+    sim: Simulation,
+    i: int,
+    wheel: SteerableWheel,
+    piece: Piece,
+    alpha: FloatArray,
+    sign: int,
 ) -> Iterator[Use]:
-    """Steering rate, its change, and what the guaranteed rates ask of it."""
+    """Steering rate, its change, what that asks of motors, and guaranteed rates."""
     rows, t = piece.rows, sim.t[piece.rows]
     if wheel.max_steering_rate_deg is not None:
         limit = math.radians(wheel.max_steering_rate_deg)
@@ -238,6 +251,15 @@ def steering_uses(
     if wheel.max_steering_acceleration_deg is not None and sim.ahead is not None:
         limit = math.radians(wheel.max_steering_acceleration_deg)
         yield use("STEER_ACCELERATION", wheel.id, sim.swinging(i)[rows], limit, t)
+    if (
+        wheel.max_acceleration is not None
+        and is_beside(wheel)
+        and sim.ahead is not None
+    ):
+        shared = wheel.steering_coupling * sim.swinging(i)[rows]
+        for offset in offsets_of(wheel):
+            gain = sim.contact_gain(i, offset, sign)[rows] + shared
+            yield use("WHEEL_ACCELERATION", wheel.id, gain, wheel.max_acceleration, t)
     if sim.vehicle.guaranteed and rate_at_rest(wheel) < math.inf:
         asked, limit = guaranteed_rate(sim, i)[rows], rate_at_rest(wheel)
         yield use("SINGULAR_ZONE", wheel.id, asked, limit, t)

@@ -262,6 +262,40 @@ class Simulation:
         body = self.vx + 1j * self.vy + 1j * self.omega * contact
         return np.asarray(((body + moved) * ahead.conj()).real)
 
+    def contact_gain(self, i: int, offset: float, sign: int) -> FloatArray:
+        """How fast the rolling speed of the wheel `offset` left of axis i changes.
+
+        By where its contact is on the body at three moments: over each step the ground
+        passes it at the body's speed there and at that of its own way on the body. 0
+        where the vehicle soon stands; without what rounding may add.
+        """
+        ahead, place = self.ahead, complex(*self.places[i])
+        assert ahead is not None
+        moments = self.twists, ahead.one, ahead.two
+        sizes = [np.abs(point_velocity(x, *self.places[i])) for x in moments]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aims = [
+                sign * point_velocity(x, *self.places[i]) / size
+                for x, size in zip(moments, sizes, strict=True)
+            ]
+        contacts = [place + 1j * offset * aim for aim in aims]
+        rolled = []
+        for k in (0, 1):
+            aim = aims[k] + aims[k + 1]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                aim = aim / np.abs(aim)
+            bodies = [
+                x[:, 0] + 1j * x[:, 1] + 1j * x[:, 2] * contact
+                for x, contact in zip(moments[k : k + 2], contacts[k:], strict=False)
+            ]
+            moved = (contacts[k + 1] - contacts[k]) / ahead.step
+            over_ground = (bodies[0] + bodies[1]) / 2 + moved
+            rolled.append((over_ground * aim.conj()).real)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            blur = 64 * EPS * (1 + abs(offset) / sizes[0]) / ahead.step**2
+        gain = np.abs(rolled[1] - rolled[0]) / ahead.step - blur
+        return np.asarray(np.where(ahead.goes_on, np.maximum(gain, 0.0), 0.0))
+
     def is_clear(self) -> bool:
         """Whether no wheel passes so near the ICR that an angle cannot be followed."""
         for i, wheel in enumerate(self.vehicle.wheels):

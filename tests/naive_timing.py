@@ -102,9 +102,8 @@ class NaiveLimits:
                 continue
             w = self._vehicle.contacts[i]
             if wheel.max_acceleration is not None:
-                steered = isinstance(wheel, SteerableWheel)
-                speed = self._size(w) if steered else self._rolling(i)
-                add(("WHEEL_ACCELERATION", i), speed, wheel.max_acceleration, -1.0)
+                for speed in self._rolls(i):
+                    add(("WHEEL_ACCELERATION", i), speed, wheel.max_acceleration, -1.0)
             if not isinstance(wheel, SteerableWheel):
                 continue
             if wheel.max_steering_acceleration_deg is not None:
@@ -164,6 +163,26 @@ class NaiveLimits:
             return middle + math.remainder(math.atan2(y, x) - middle, 2 * math.pi)
 
         return angle
+
+    def _rolls(self, i: int) -> list[Function]:
+        """Return the rolling speeds per u̇ of the wheels on an axis.
+
+        With what steering takes of shared motors, in either direction.
+        """
+        wheel, w = self._vehicle.wheels[i], self._vehicle.contacts[i]
+        if not isinstance(wheel, SteerableWheel):
+            return [self._rolling(i)]
+
+        def roll(offset: float, share: float) -> Function:
+            def speed(u: float) -> float:
+                alpha = self._difference(self._angle(w, u), u)
+                turn = self._turning(u) + alpha
+                return self._size(w)(u) - self._sigma * turn * offset + share * alpha
+
+            return speed
+
+        k = wheel.steering_coupling
+        return [roll(d, s) for d in wheel.offsets for s in {k, -k}]
 
     def _rolling(self, i: int) -> Function:
         wheel = self._vehicle.wheels[i]

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
-from omniplan.batch.motions import FIELDS, LANES
+from omniplan.batch.kernel import kernel
+from omniplan.batch.motions import FIELDS, LANES, SWING_FIELDS
 
 __all__ = ["ROOM", "body", "change", "chord", "ends", "reach"]
 
@@ -29,11 +28,13 @@ NEAR, FAR, RADIUS = ((FIELDS + 11 + i) * LANES for i in range(3))
 DAX, DAY, DBX, DBY, BEND, REACH = ((FIELDS + 14 + i) * LANES for i in range(6))
 # ... and what a row says.
 LOW, HIGH = ((FIELDS + 20 + i) * LANES for i in range(2))
-ROOM = (FIELDS + 22) * LANES
+# ... and how directions swing: see `swings`.
+SWUNG = (FIELDS + 22) * LANES
+ROOM = SWUNG + SWING_FIELDS * LANES
 """Size of the scratch array of a block."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def ends(s: Array, x: float, y: float) -> None:
     """Write the ends and the radius of `Chord.of` a point of the body."""
     arm = math.sqrt(x * x + y * y)
@@ -45,7 +46,7 @@ def ends(s: Array, x: float, y: float) -> None:
         s[RADIUS + k] = dt * dt / 8 * (s[VB + k] + s[WB + k] * arm)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def chord(s: Array, x: float, y: float) -> None:
     """Write `Chord.of` a point of the body."""
     ends(s, x, y)
@@ -67,7 +68,7 @@ def chord(s: Array, x: float, y: float) -> None:
         s[FAR + k] = most + radius
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def change(s: Array, x: float, y: float) -> None:
     """Write `Change.of` a point of the body, without its largest size."""
     arm = math.sqrt(x * x + y * y)
@@ -78,7 +79,7 @@ def change(s: Array, x: float, y: float) -> None:
         s[BEND + k] = s[VB + k] + s[WB + k] * arm
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def reach(s: Array) -> None:
     """Write the largest size of a change."""
     for k in range(LANES):
@@ -87,7 +88,7 @@ def reach(s: Array) -> None:
         s[REACH + k] = math.sqrt(a if a > b else b) + s[DT + k] / 2 * s[BEND + k]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def body(s: Array, x: float, y: float, kappa_g: float, standstill: float) -> None:
     """Speeds of the body with K at (x, y); whether it moves at the ends, or stands.
 

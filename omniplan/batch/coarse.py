@@ -15,8 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from omniplan.batch import rows as kinds
+from omniplan.batch import kinds
+from omniplan.batch.kernel import kernel
 from omniplan.batch.motions import LANES, Motions
+from omniplan.batch.steering import arc_cosine
 
 __all__ = ["GROUP", "groups_of", "screen"]
 
@@ -29,10 +31,10 @@ PER_BLOCK = LANES // GROUP
 # of the change of v.
 MIDDLE, OFF, RADIUS, CHANGE, CHANGE_OFF, CHANGE_RADIUS = 0, 3, 6, 7, 10, 13
 FIELDS = 14
-# Of a point: velocity (2), its size, how far it is off; the same of its change; and a
-# lower bound on the speed of the vehicle.
-UX, UY, UN, UR, DX, DY, DN, DR, SLOW = range(9)
-SCRATCH = 9
+# Of a point: velocity (2), its size, how far it is off; the same of its change; and
+# bounds on the speed of the vehicle.
+UX, UY, UN, UR, DX, DY, DN, DR, SLOW, FAST = range(10)
+SCRATCH = 10
 ROUNDING = 1e-9
 """By so much, relative, all bounds are wider: it covers float64 arithmetic."""
 ANGLE_ROUNDING = 1e-6
@@ -73,7 +75,7 @@ def _fill_groups(blocks: Array, first: Array, first_group: Array, out: Array) ->
             _enclose(part, 6, 0.5, 1, into, CHANGE, g % LANES)
 
 
-@njit(cache=True)
+@kernel()
 def _enclose(
     part: Array, field: int, share: float, power: int, out: Array, into: int, lane: int
 ) -> None:
@@ -101,7 +103,7 @@ def _enclose(
     out[into + 6, lane] = radius + bend + slack
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _point(f: Array, u: Array, x: float, y: float) -> None:
     """Write velocity and change of a point of the body."""
     arm = math.sqrt(x * x + y * y)
@@ -119,17 +121,20 @@ def _point(f: Array, u: Array, x: float, y: float) -> None:
         u[DR, k] = f[CHANGE_RADIUS, k] + f[CHANGE_OFF + 2, k] * arm
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _slowest(f: Array, u: Array, x: float, y: float, kappa_g: float) -> None:
-    """Write a lower bound on the speed of a vehicle with K at (x, y)."""
+    """Write bounds on the speed of a vehicle with K at (x, y)."""
     _point(f, u, x, y)
     for k in range(LANES):
         least = u[UN, k] - u[UR, k]
         turn = (abs(f[MIDDLE + 2, k]) - f[OFF + 2, k]) / kappa_g
         u[SLOW, k] = least if least > turn else turn
+        most = u[UN, k] + u[UR, k]
+        turn = (abs(f[MIDDLE + 2, k]) + f[OFF + 2, k]) / kappa_g
+        u[FAST, k] = most if most > turn else turn
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _linear(
     f: Array, field: int, x: float, y: float, along_x: float, along_y: float,
     limit: float, out: Array,
@@ -143,7 +148,7 @@ def _linear(
         out[k] = (abs(at) + off + abs(c) * f[field + 5, k]) * per
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _against(u: Array, sine: float, speed: float, out: Array) -> None:
     """Hold it against what the tolerances allow."""
     for k in range(LANES):
@@ -151,7 +156,7 @@ def _against(u: Array, sine: float, speed: float, out: Array) -> None:
         out[k] /= room if room > speed else speed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _direction(u: Array, kind: int, row: Array, out: Array) -> None:
     """Bound rows about the direction of a velocity, or about what is along it.
 
@@ -171,8 +176,8 @@ def _direction(u: Array, kind: int, row: Array, out: Array) -> None:
         if kind == kinds.SINGULAR:
             value = 0.0
         elif kind == kinds.RANGE:
-            spread = math.pi / 2 - kinds.arc_cosine(radius * per)
-            aside = kinds.arc_cosine(ex * cos + ey * sin)
+            spread = math.pi / 2 - arc_cosine(radius * per)
+            aside = arc_cosine(ex * cos + ey * sin)
             value = (aside + spread + ANGLE_ROUNDING) / bound
         elif kind == kinds.RATE:
             across = abs(u[DY, k] * ex - u[DX, k] * ey) + more
@@ -188,7 +193,7 @@ def _direction(u: Array, kind: int, row: Array, out: Array) -> None:
         out[k] = np.inf if lost else value
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _whole(f: Array, u: Array, kind: int, row: Array, floor: float, out: Array) -> None:
     """Bound rows about sizes."""
     per, x, y = 1.0 / row[kinds.BOUND], row[kinds.ALONG], row[kinds.ALONG + 1]
@@ -212,7 +217,29 @@ def _whole(f: Array, u: Array, kind: int, row: Array, floor: float, out: Array) 
         out[k] = value * per
 
 
-@njit(cache=True)
+@kernel(error_model="numpy")
+def _steered(f: Array, u: Array, kind: int, row: Array, out: Array) -> None:
+    """Bound what a wheel rolls beside its axis, or what guaranteed rates ask for."""
+    per = 1.0 / row[kinds.BOUND]
+    if kind == kinds.BESIDE:
+        # |u| + |D| (|ω| + |α̇|) + k |α̇|, with |α̇| over the same bound in `out`
+        _direction(u, kinds.RATE, row, out)
+        lever = abs(row[kinds.OFFSET])
+        for k in range(LANES):
+            yaw = abs(f[MIDDLE + 2, k]) + f[OFF + 2, k]
+            rolled = (u[UN, k] + u[UR, k] + lever * yaw) * per
+            out[k] = rolled + (lever + row[kinds.COUPLING]) * out[k]
+        return
+    arm = math.hypot(row[kinds.ZONE_ARM], row[kinds.ZONE_ARM + 1])
+    asked = row[kinds.ZONE_KAPPA] * row[kinds.ZONE_POLE] * per
+    asked += row[kinds.ZONE_BETA] * (1 + arm) * per
+    for k in range(LANES):
+        near = u[UN, k] - u[UR, k]
+        room = near / (u[FAST, k] if near > 0.0 else 1.0)
+        out[k] = asked / (room * room) * (1 + ROUNDING) if near > 0.0 else np.inf
+
+
+@kernel()
 def screen(
     groups: Array, rows: Array, vehicle: Array, tolerances: Array, u: Array, out: Array
 ) -> None:
@@ -224,7 +251,7 @@ def screen(
         Of one motion.
     rows : (r, PARAMETERS) float
     vehicle, tolerances
-        As for `batch_rows.evaluate`.
+        As for `rows.evaluate`.
     u : (SCRATCH, LANES) float
         Scratch.
     out : (r, c LANES) float
@@ -255,10 +282,16 @@ def screen(
                     into[k] *= bound / vehicle[2]
                 _against(u, sine, speed, into)
                 continue
+            if kind >= kinds.SWING:
+                for k in range(LANES):
+                    into[k] = np.inf  # groups do not tell
+                continue
             if x != at_x or y != at_y:
                 at_x, at_y = x, y
                 _point(f, u, x, y)
-            if kind in (kinds.SINGULAR, kinds.RANGE, kinds.RATE, kinds.GROWTH):
+            if kind in (kinds.BESIDE, kinds.ZONE):
+                _steered(f, u, kind, rows[r], into)
+            elif kind in (kinds.SINGULAR, kinds.RANGE, kinds.RATE, kinds.GROWTH):
                 _direction(u, kind, rows[r], into)
             else:
                 _whole(f, u, kind, rows[r], tolerances[0], into)

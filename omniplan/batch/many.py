@@ -7,12 +7,11 @@ every verdict is that of `validate`.
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import math
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -25,8 +24,9 @@ import pyarrow as pa
 from configspace import InvalidInput, PermissibleSpace, Problem
 from configspace.space import require_space
 from omniplan.batch.coarse import groups_of
-from omniplan.batch.fleet import Fleet, fleet_of, is_plain
-from omniplan.batch.motions import Motions, motions_of
+from omniplan.batch.fleet import Fleet, fleet_of, is_connected, is_plain
+from omniplan.batch.motions import Knots, knots_of, parts_of
+from omniplan.batch.reaches import codes_of
 from omniplan.batch.twists import check_twists
 from omniplan.batch.verdicts import UNCLEAR, VALID, judge_pairs
 from omniplan.judging.rows import Tolerances
@@ -43,7 +43,11 @@ Name: TypeAlias = str | None
 CHUNK = 1 << 18
 """Pairs whose verdicts are held at once."""
 SLICES = 64
-"""Into so many tasks the motions of a chunk are cut for the threads."""
+"""Into at least so many tasks for the threads a chunk is cut ..."""
+SAMPLES = 1 << 15
+"""... and into more where one would have more samples than this."""
+AHEAD = 2
+"""Tasks per thread that may be under way."""
 UNKNOWN = -1
 """Instead of a label: nothing refuses the pair, and nothing limits it."""
 KERNEL_FORMS = ("poses", "twists")
@@ -177,8 +181,13 @@ class Batch:
     @cached_property
     def _types(self) -> tuple[Fleet, IntArray]:
         """The different vehicles among the plain ones, and which each of them is."""
-        vehicles = [self.spaces[i].vehicle for i in self._plain]
-        fleet = fleet_of([v for v in vehicles if v is not None], self.tolerances)
+        spaces = [self.spaces[i] for i in self._plain]
+        vehicles = [space.vehicle for space in spaces if space.vehicle is not None]
+        codes = [
+            None if self.allow_unreachable or is_connected(space) else codes_of(space)
+            for space in spaces
+        ]
+        fleet = fleet_of(vehicles, self.tolerances, codes=codes)
         known: dict[bytes, int] = {}
         kind = np.array(
             [
@@ -218,8 +227,9 @@ class Batch:
         rows = [i for i, x in enumerate(chunk) if x.form in KERNEL_FORMS]
         if rows and self._plain:
             fleet, kind = self._types
-            motions = motions_of([chunk[i] for i in rows])
-            self._run_kernels(motions, fleet, found, np.ix_(rows, self._plain), kind)
+            known = [chunk[i] for i in rows]
+            self._run_kernels(known, fleet, found, np.ix_(rows, self._plain), kind)
+        self._run_owners(chunk, found)
         for i, j in np.argwhere(found.status == UNCLEAR):
             report = judged(
                 chunk[i], self.spaces[j], self.tolerances, self.allow_unreachable
@@ -233,39 +243,74 @@ class Batch:
             [space.name for space in self.spaces],
         )
 
+    def _run_owners(self, chunk: Sequence[Trajectory], found: _Verdicts) -> None:
+        """Judge Omni-Curve-Parameters for their own vehicles by the kernels."""
+        by_owner: dict[int, list[int]] = {}
+        for i, trajectory in enumerate(chunk):
+            if trajectory.vehicle is not None:
+                by_owner.setdefault(id(trajectory.vehicle), []).append(i)
+        for rows in by_owner.values():
+            owner = chunk[rows[0]].vehicle
+            own = [
+                j
+                for j in self._plain
+                if self.spaces[j].vehicle == owner
+                and (self.allow_unreachable or is_connected(self.spaces[j]))
+            ]
+            if owner is None or not own:
+                continue
+            fleet = fleet_of([owner], self.tolerances, is_own=True)
+            known = [chunk[i] for i in rows]
+            kind = np.zeros(len(own), dtype=np.int64)
+            self._run_kernels(known, fleet, found, np.ix_(rows, own), kind, is_own=True)
+
     def _run_kernels(
         self,
-        motions: Motions,
+        trajectories: Sequence[Trajectory],
         fleet: Fleet,
         found: _Verdicts,
         at: tuple[Any, ...],
         kind: IntArray,
+        *,
+        is_own: bool = False,
     ) -> None:
-        """Judge by the kernels and write what they say to places `at`."""
+        """Judge by the kernels and write what they say to places `at`.
+
+        While threads judge some of the trajectories the splines of the next are made.
+        """
         t = self.tolerances
-        limits = (t.standstill, math.sin(t.slip_angle), t.slip_speed, t.alignment)
-        shape = motions.count.size, len(fleet.bodies)
+        # An own (κ_n, β) is a configuration even where the vehicle stands.
+        standstill = -1.0 if is_own else t.standstill
+        limits = np.array(
+            (standstill, math.sin(t.slip_angle), t.slip_speed, t.alignment)
+        )
+        shape = len(trajectories), len(fleet.bodies)
         status = np.empty(shape, np.uint8)
         which = np.empty(shape, np.int32)
         numbers = np.full((*shape, 4), np.nan)
-        moved = (
-            motions.blocks,
-            motions.knot_of,
-            motions.first,
-            motions.count,
-            motions.knots,
-            motions.is_pose,
-            *groups_of(motions),
-        )
-        known = (fleet.bodies, fleet.rows, fleet.order, fleet.first)
-        edges = np.linspace(0, shape[0], min(SLICES, shape[0]) + 1).astype(int)
+        known = fleet.arrays
 
-        def judge(span: tuple[int, int]) -> None:
-            judge_pairs(moved, *span, known, np.array(limits), status, which, numbers)
+        def judge(knots: Knots, place: slice) -> None:
+            moved = parts_of(knots)
+            judge_pairs(
+                (*moved.arrays, moved.samples, *groups_of(moved)),
+                known,
+                limits,
+                status[place],
+                which[place],
+                numbers[place],
+            )
 
-        spans = itertools.pairwise(edges.tolist())
-        with ThreadPoolExecutor(numba.get_num_threads()) as threads:
-            list(threads.map(judge, spans))
+        workers = numba.get_num_threads()
+        with ThreadPoolExecutor(workers) as threads:
+            running: deque[Future[None]] = deque()
+            for place in _slices(trajectories):
+                knots = knots_of(trajectories[place], is_own=is_own)
+                if len(running) == AHEAD * workers:
+                    running.popleft().result()
+                running.append(threads.submit(judge, knots, place))
+            for task in running:
+                task.result()
         found.status[at] = status[:, kind]
         found.margin[at] = numbers[:, kind, 0]
         for column, numbers_ in zip(
@@ -299,11 +344,11 @@ class _Verdicts:
         return cls(status, margin, t, value, bound, label)
 
     def code(self, fleet: Fleet) -> npt.NDArray[np.int32]:
-        """Return the number of the label of every row of a fleet."""
+        """Return the numbers of all that a fleet tells."""
         return np.array(
             [
                 self._number(label.limit, label.wheel or None, label.unit)
-                for label in fleet.labels
+                for label in fleet.told
             ],
             dtype=np.int32,
         )
@@ -353,6 +398,19 @@ class _Verdicts:
             ],
             schema=SCHEMA,
         )
+
+
+def _slices(trajectories: Sequence[Trajectory]) -> Iterator[slice]:
+    """Yield runs of trajectories that are judged together."""
+    most = -(-len(trajectories) // SLICES)
+    start, samples = 0, 0
+    for i, trajectory in enumerate(trajectories):
+        size = trajectory.t.size
+        if i > start and (i - start == most or samples + size > SAMPLES):
+            yield slice(start, i)
+            start, samples = i, 0
+        samples += size
+    yield slice(start, len(trajectories))
 
 
 def _whole(turns: Generator[None, None, pa.RecordBatch]) -> pa.RecordBatch:
@@ -418,6 +476,9 @@ def _bar(total: int) -> Iterator[Any]:
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    # Where nobody watches even an invisible bar ends with a blank line.
+    is_hidden = not console.is_terminal
+    with Progress(console=console, transient=True, disable=is_hidden) as bar:
         task = bar.add_task("Judging pairs", total=total)
         yield lambda count: bar.advance(task, count)

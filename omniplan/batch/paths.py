@@ -63,7 +63,8 @@ class PathBatch:
         from rich.progress import Progress
 
         console = Console(stderr=True)
-        with Progress(console=console, transient=True, disable=not progress) as bar:
+        is_hidden = not (progress and console.is_terminal)
+        with Progress(console=console, transient=True, disable=is_hidden) as bar:
             task = bar.add_task("Timing and judging", total=self.pairs)
             for start in range(0, len(self.motions), CHUNK):
                 chunk = self.motions[start : start + CHUNK]

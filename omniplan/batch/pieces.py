@@ -1,6 +1,6 @@
 """What lies between standstills, and which representation is driven there, in numba.
 
-As in `standstill`, but without any change of the wheels at rest.
+As in `standstill`; see `rests` for changes of the wheels at rest.
 """
 # mypy: disallow-untyped-decorators = False
 
@@ -10,7 +10,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from omniplan.batch.chords import (
     AX,
@@ -26,9 +25,12 @@ from omniplan.batch.chords import (
     body,
     chord,
 )
+from omniplan.batch.kernel import kernel
+from omniplan.batch.kinds import ANGLE, AT, KIND, RANGE, SINGULAR
 from omniplan.batch.motions import LANES
 from omniplan.batch.refine import load
-from omniplan.batch.rows import ANGLE, AT, KIND, RANGE, SINGULAR
+from omniplan.batch.rests import CHANGES, CLEAR, OPEN, change_at
+from omniplan.standing.winding_search import SHORT_REST
 
 __all__ = ["MAX_PIECES", "angle_of", "choose", "pieces_of"]
 
@@ -38,7 +40,7 @@ MAX_PIECES = 24
 """Motions with more pieces between standstills are left to `validate`."""
 
 
-@njit(cache=True)
+@kernel()
 def pieces_of(
     blocks: Array, count: int, vehicle: Array, tolerances: Array, s: Array, ends: Array
 ) -> int:
@@ -76,7 +78,7 @@ def pieces_of(
     return pieces
 
 
-@njit(cache=True)
+@kernel()
 def angle_of(s: Array, lane: int, at_end: bool, sign: float, middle: float) -> float:
     """Direction of a wheel at an end of a part, aside of the middle of its range."""
     x, y = (s[BX + lane], s[BY + lane]) if at_end else (s[AX + lane], s[AY + lane])
@@ -84,7 +86,7 @@ def angle_of(s: Array, lane: int, at_end: bool, sign: float, middle: float) -> f
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
-@njit(cache=True)
+@kernel()
 def _continues(
     blocks: Array, rows: Array, s: Array, last: int, first: int, before: float,
     after: float, alignment: float,
@@ -113,43 +115,76 @@ def _continues(
     return 0 if worst > 1.1 * alignment else -1
 
 
-@njit(cache=True)
+@kernel(inline="always")
+def _price(change: Array, is_turned: bool) -> float:
+    """Return what a change costs beside broken limits, as in `standstill`.
+
+    What is not known costs as little as it may.
+    """
+    price = 1e-9 if is_turned else 0.0
+    if change[0] == CLEAR:
+        price += SHORT_REST if change[1] > change[2] else 0.0
+        price += min(change[1], 1e3) * 1e-6
+    return price
+
+
+@kernel()
 def choose(
-    blocks: Array, rows: Array, s: Array, ends: Array, pieces: int, by_piece: Array,
-    alignment: float, signs: Array,
+    blocks: Array, knot_of: Array, knots: Array, form: int, rows: Array,
+    own_rows: Array, vehicle: Array, tolerances: Array, s: Array, ends: Array,
+    pieces: int, by_piece: Array, changes: Array, signs: Array,
 ) -> bool:  # fmt: skip
     """Choose the representation of every piece as `choose_configurations` does.
 
-    Among those with the least broken limits, without a change of the wheels at any
-    standstill; False if there is no such way.
+    Among those with the least broken limits the one with the least cost of what happens
+    at the standstills between: `changes` (pieces, 2, 2, CHANGES) gets that, by the
+    representations before and after. False if it is not known.
     """
-    # Cost (changes of sign) and path (a bit per piece, 1 backwards) per last sign.
-    cost, path = np.full(2, np.inf), np.zeros(2, np.int64)
+    # Cost and path (a bit per piece, 1 backwards) per last sign.
+    cost, path = (np.inf, np.inf), (np.int64(0), np.int64(0))
     for p in range(pieces):
         least = min(by_piece[p, 0, 0], by_piece[p, 1, 0])
-        new_cost, new_path = np.full(2, np.inf), np.zeros(2, np.int64)
+        new_cost, new_path = (np.inf, np.inf), (np.int64(0), np.int64(0))
         for after in range(2):
             if by_piece[p, after, 0] > least:
                 continue
-            if p == 0:
-                new_cost[after], new_path[after] = 0.0, after
-                continue
-            for before in range(2):
+            best, kept = (0.0, np.int64(after)) if p == 0 else (np.inf, np.int64(0))
+            # First where the wheels stay as they are: that costs nearly nothing.
+            for turn in range(4 if p > 0 else 0):
+                before, stays = turn % 2, turn < 2
                 if cost[before] == np.inf:
                     continue
-                goes_on = _continues(
-                    blocks, rows, s, ends[p - 1, 1] - 1, ends[p, 0],
-                    1.0 - 2.0 * before, 1.0 - 2.0 * after, alignment,
-                )  # fmt: skip
-                if goes_on < 0:
-                    return False
-                if goes_on == 0:
+                last, first = ends[p - 1, 1] - 1, ends[p, 0]
+                change = changes[p - 1, before, after]
+                own = 1.0 - 2.0 * before, 1.0 - 2.0 * after
+                if stays:
+                    goes_on = _continues(
+                        blocks, rows, s, last, first, own[0], own[1], tolerances[3]
+                    )
+                    for i in range(CHANGES):
+                        change[i] = 0.0
+                    change[0] = CLEAR if goes_on > 0 else OPEN
+                    if goes_on <= 0:
+                        continue
+                elif change[0] == CLEAR:
                     continue
-                price = cost[before] + (1.0 if before != after else 0.0)
+                else:
+                    # A wheel turns by at least what counts as alike.
+                    floor = 0.9e-6 * tolerances[3] * vehicle[6]
+                    if cost[before] + _price(change, before != after) + floor > best:
+                        continue
+                    change_at(
+                        knots[knot_of[last // LANES, last % LANES]],
+                        knots[knot_of[first // LANES, first % LANES]], form, own,
+                        own_rows, rows, vehicle, tolerances, s, change,
+                    )  # fmt: skip
+                price = cost[before] + _price(change, before != after)
                 way = 2 * path[before] + after
-                better = price < new_cost[after]
-                if better or (price == new_cost[after] and way < new_path[after]):
-                    new_cost[after], new_path[after] = price, way
+                if price < best or (price == best and way < kept):
+                    best, kept = price, way
+            is_first = after == 0
+            new_cost = (best, new_cost[1]) if is_first else (new_cost[0], best)
+            new_path = (kept, new_path[1]) if is_first else (new_path[0], kept)
         cost, path = new_cost, new_path
     if cost[0] == np.inf and cost[1] == np.inf:
         return False
@@ -158,4 +193,7 @@ def choose(
         last = 1
     for p in range(pieces):
         signs[p] = (path[last] >> (pieces - 1 - p)) & 1
+    for p in range(pieces - 1):
+        if changes[p, signs[p], signs[p + 1], 0] != CLEAR:
+            return False
     return True

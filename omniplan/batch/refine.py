@@ -10,15 +10,28 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from omniplan.batch.chords import HIGH, LOW
-from omniplan.batch.coarse import PER_BLOCK, SCRATCH, screen
+from omniplan.batch.chords import HIGH, LOW, SWUNG
+from omniplan.batch.coarse import PER_BLOCK, screen
+from omniplan.batch.kernel import kernel
+from omniplan.batch.kinds import BOUND, KIND, RANGE, RANGE_ERROR, SIGN
 from omniplan.batch.motions import FIELDS, LANES, enclose
-from omniplan.batch.rows import BOUND, KIND, RANGE, RANGE_ERROR, SIGN, evaluate
+from omniplan.batch.rows import evaluate
+from omniplan.batch.swings import is_swinging, is_wide, load_swings, swing_into
 from omniplan.judging.proof import RESOLUTION, ROUNDING, SHARPNESS
 
-__all__ = ["HALVES", "KEPT", "NO", "STACK", "YES", "load", "one_row", "refine", "sweep"]
+__all__ = [
+    "HALVES",
+    "KEPT",
+    "NO",
+    "STACK",
+    "YES",
+    "describe",
+    "load",
+    "one_row",
+    "refine",
+    "sweep",
+]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
@@ -27,7 +40,7 @@ DEEP = 3
 HALVES = 2 ** (DEEP + 1) - 2
 """... so many per part."""
 STACK = 1024
-"""Parts that may wait for being halved."""
+"""Parts that may wait for being halved; behind them is room for those in work."""
 NO, YES = np.int64(0), np.int64(1)
 """Not plain numbers: for each of those numba would compile a variant of its own."""
 EVALUATED = -1.0
@@ -36,15 +49,15 @@ KEPT = 1 + ROUNDING
 """The largest utilisation that keeps a limit."""
 
 
-@njit(cache=True)
+@kernel()
 def load(blocks: Array, b: int, s: Array) -> None:
     """Copy the enclosures of a block into the scratch array."""
-    for i in range(FIELDS):
-        for k in range(LANES):
-            s[i * LANES + k] = blocks[b, i, k]
+    block = blocks.reshape(blocks.shape[0], -1)[b]
+    for k in range(FIELDS * LANES):  # one loop is vector code, two are not
+        s[k] = block[k]
 
 
-@njit(cache=True)
+@kernel()
 def largest(values: Array, at: int) -> float:
     """Return the largest of the lanes from `at` on."""
     a, b, c, d = values[at], values[at + 1], values[at + 2], values[at + 3]
@@ -57,7 +70,7 @@ def largest(values: Array, at: int) -> float:
     return float(a if a > b else b)
 
 
-@njit(cache=True)
+@kernel()
 def _first_block(tops: Array, rows: Array, blocks: int, most: Array) -> int:
     """Return the block in which most may be reached; `most` is scratch."""
     groups = tops.shape[1]
@@ -75,7 +88,7 @@ def _first_block(tops: Array, rows: Array, blocks: int, most: Array) -> int:
     return at // PER_BLOCK
 
 
-@njit(cache=True)
+@kernel()
 def _choose_rows(
     tops: Array, b: int, blocks: int, worst: float, done: Array, wanted: Array,
     skipped: Array, high: Array,
@@ -100,7 +113,7 @@ def _choose_rows(
     return some
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def sweep(
     blocks: Array, groups: Array, rows: Array, vehicle: Array, tolerances: Array,
     s: Array, tops: Array, wanted: Array, done: Array, most: Array, highs: Array,
@@ -115,21 +128,22 @@ def sweep(
     that counts in any case.
     """
     n_rows, n_blocks = rows.shape[0], blocks.shape[0]
-    n_groups = LANES * groups.shape[0]
-    bounds = tops[: n_rows * n_groups].reshape(n_rows, n_groups)
-    u = s[: SCRATCH * LANES].reshape(SCRATCH, LANES)
+    bounds = tops[:n_rows]
+    u = s.reshape(-1, LANES)
     screen(groups, rows, vehicle, tolerances, u, bounds)
     for r in range(n_rows):
         low[r], high[r], at[r], done[r] = 0.0, 0.0, 0, 0.0
     start = _first_block(bounds, rows, n_blocks, highs)
     for k in range(2 * LANES * n_rows):
         most[k] = 0.0
-    worst = 0.0
+    worst, swings = 0.0, is_swinging(rows)
     for i in range(n_blocks):
         b = start if i == 0 else (i - 1 if i <= start else i)
         if not _choose_rows(bounds, b, n_blocks, worst, done, wanted, skipped, high):
             continue
         load(blocks, b, s)
+        if swings:
+            load_swings(blocks, b, s)
         evaluate(s, rows, NO, n_rows, vehicle, tolerances, NO, wanted, most, highs, b,
             n_blocks,
         )  # fmt: skip
@@ -148,7 +162,7 @@ def sweep(
         high[r] = top if top > high[r] else high[r]
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def one_row(
     s: Array, rows: Array, r: int, vehicle: Array, tolerances: Array, exact: int
 ) -> None:
@@ -156,9 +170,9 @@ def one_row(
     evaluate(s, rows, r, r + 1, vehicle, tolerances, exact, s, s, s, NO, NO)
 
 
-@njit(cache=True)
+@kernel()
 def _halve(
-    knot: Array, is_pose: bool, t0: float, t1: float, depth: int, node: int, wide: int,
+    knot: Array, form: int, t0: float, t1: float, depth: int, node: int, wide: int,
     halves: tuple[Array, Array], view: Array, lane: int,
 ) -> None:  # fmt: skip
     """Write the enclosures of both halves of a part into two lanes.
@@ -170,24 +184,65 @@ def _halve(
     kept, is_known = halves
     half = (t0 + t1) / 2
     if depth > DEEP:
-        enclose(knot, is_pose, t0, half, view, lane)
-        enclose(knot, is_pose, half, t1, view, lane + 1)
+        enclose(knot, form, t0, half, view, lane)
+        enclose(knot, form, half, t1, view, lane + 1)
         return
     at = wide * (2**depth - 2) + node
     if is_known[at]:
         for i in range(FIELDS):
             view[i, lane], view[i, lane + 1] = kept[at, i], kept[at + 1, i]
         return
-    enclose(knot, is_pose, t0, half, view, lane)
-    enclose(knot, is_pose, half, t1, view, lane + 1)
+    enclose(knot, form, t0, half, view, lane)
+    enclose(knot, form, half, t1, view, lane + 1)
     for i in range(FIELDS):
         kept[at, i], kept[at + 1, i] = view[i, lane], view[i, lane + 1]
     is_known[at] = True
 
 
-@njit(cache=True)
+@kernel()
+def _swing_halves(
+    knots: Array, form: int, those: Array, view: Array, taken: int, s: Array
+) -> None:
+    """Write how directions swing over the halves of parts."""
+    whole = s.reshape(-1, LANES)
+    for k in range(2 * taken):
+        swing_into(
+            knots[those[k // 2]], form, view[15, k], view[16, k], whole,
+            SWUNG // LANES, k,
+        )  # fmt: skip
+
+
+@kernel()
+def describe(
+    knot: Array, form: int, row: Array, vehicle: Array, tolerances: Array,
+    s: Array, times: tuple[float, float],
+) -> int:  # fmt: skip
+    """Evaluate a row at two times, in the first lanes; return at which it is worse.
+
+    Parameters
+    ----------
+    knot : (KNOT,) float
+    form : bool
+    row : (1, PARAMETERS) float
+    vehicle, tolerances
+        As for `evaluate`.
+    s : (ROOM,) float
+        Scratch.
+    times : two floats, s
+    """
+    view = s.reshape(-1, LANES)
+    for k in range(LANES):
+        t = times[0] if k == 0 else times[1]
+        enclose(knot, form, t, t, view, k)
+        if is_wide(row[0, KIND]):
+            swing_into(knot, form, t, t, view, SWUNG // LANES, k)
+    one_row(s, row, NO, vehicle, tolerances, YES)
+    return 1 if s[LOW + 1] > s[LOW] else 0
+
+
+@kernel()
 def refine(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool,
+    blocks: Array, knot_of: Array, count: int, knots: Array, form: int,
     rows: Array, r: int, vehicle: Array, tolerances: Array, s: Array, highs: Array,
     skipped: Array, halves: tuple[Array, Array], stack: Array, knot_at: Array,
     first: int, last: int, threshold: float, halvings: int, reaching: int,
@@ -203,7 +258,7 @@ def refine(
     is_proof = threshold == KEPT
     low, high = 0.0, 0.0
     waiting = 0
-    view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
+    view = s.reshape(-1, LANES)
     # What `sweep` found on every part.
     parts = r * blocks.shape[0] * LANES
     error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
@@ -216,12 +271,16 @@ def refine(
             continue
         if reaching or is_proof or bound >= 0.0:
             load(blocks, b, s)
+            if is_wide(rows[r, KIND]):
+                load_swings(blocks, b, s)
             one_row(s, rows, r, vehicle, tolerances, NO)
             if bound >= 0.0:
-                highs[at : at + LANES] = s[HIGH : HIGH + LANES]
+                for k in range(LANES):
+                    highs[at + k] = s[HIGH + k]
                 skipped[r * blocks.shape[0] + b] = EVALUATED
         else:
-            s[LOW : LOW + LANES] = 0.0
+            for k in range(LANES):
+                s[LOW + k] = 0.0
         for k in range(LANES):
             if not first <= b * LANES + k < last:
                 continue
@@ -242,7 +301,7 @@ def refine(
                 waiting += 1
             else:
                 high = np.inf
-    depths, nodes, those = np.empty(8), np.empty(8), np.empty(8, np.int64)
+    halved, those = stack[STACK:], knot_at[STACK:]
     while waiting > 0:
         if is_proof and (low > KEPT or high > KEPT):
             break
@@ -252,16 +311,19 @@ def refine(
         base = waiting - taken
         for i in range(taken):
             j = base + i
-            depths[i], nodes[i], those[i] = stack[j, 2] + 1, stack[j, 3], knot_at[j]
+            halved[i, 0], halved[i, 1] = stack[j, 2] + 1, stack[j, 3]
+            those[i] = knot_at[j]
             _halve(
-                knots[knot_at[j]], is_pose, stack[j, 0], stack[j, 1], int(depths[i]),
-                int(2 * nodes[i]), blocks.shape[0] * LANES, halves, view, 2 * i,
+                knots[knot_at[j]], form, stack[j, 0], stack[j, 1], int(halved[i, 0]),
+                int(2 * halved[i, 1]), blocks.shape[0] * LANES, halves, view, 2 * i,
             )  # fmt: skip
+        if is_wide(rows[r, KIND]):
+            _swing_halves(knots, form, those, view, taken, s)
         one_row(s, rows, r, vehicle, tolerances, YES if is_proof else NO)
         off = 0.0 if is_proof else error  # of the quick arc cosine
         waiting = base
         for k in range(2 * taken):
-            depth, t0, t1 = depths[k // 2], view[15, k], view[16, k]
+            depth, t0, t1 = halved[k // 2, 0], view[15, k], view[16, k]
             reached, most = s[LOW + k] - off, s[HIGH + k] + off
             if reached > low:
                 low = reached
@@ -272,7 +334,7 @@ def refine(
             else:
                 stack[waiting, 0], stack[waiting, 1] = t0, t1
                 stack[waiting, 2] = depth
-                stack[waiting, 3] = 2 * nodes[k // 2] + k % 2
+                stack[waiting, 3] = 2 * halved[k // 2, 1] + k % 2
                 knot_at[waiting] = those[k // 2]
                 waiting += 1
     if low > KEPT:

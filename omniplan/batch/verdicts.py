@@ -2,8 +2,8 @@
 
 The same proof as in `proof` and `standstill`, told apart by rows: what a row may reach
 at most over all parts either keeps the limit, or the parts in question are halved until
-it is decided. A pair is left to `validate` (`UNCLEAR`) where the configuration has to
-change at a standstill, or a limit can neither be proved kept nor broken.
+it is decided. A pair is left to `validate` (`UNCLEAR`) where a limit can neither be
+proved kept nor broken, or a change of configuration at a standstill asks for a search.
 """
 # mypy: disallow-untyped-decorators = False
 
@@ -16,13 +16,13 @@ import numpy as np
 from numba import njit
 
 from omniplan.batch.chords import LOW, NA, ROOM
-from omniplan.batch.motions import FIELDS, LANES, enclose
-from omniplan.batch.pieces import MAX_PIECES, angle_of, choose, pieces_of
-from omniplan.batch.refine import HALVES, KEPT, NO, STACK, YES, one_row, refine, sweep
-from omniplan.batch.rows import (
+from omniplan.batch.headline import NOWHERE, headline, is_driven, told
+from omniplan.batch.kernel import kernel
+from omniplan.batch.kinds import (
     ANGLE,
     BOUND,
     KIND,
+    OWN_RANGE,
     PARALLEL,
     RANGE,
     RANGE_ERROR,
@@ -30,7 +30,15 @@ from omniplan.batch.rows import (
     SINGULAR,
     SLIP,
 )
+from omniplan.batch.motions import FIELDS, LANES
+from omniplan.batch.pieces import MAX_PIECES, angle_of, choose, pieces_of
+from omniplan.batch.reaches import LOST, REACHED, component_of
+from omniplan.batch.refine import HALVES, KEPT, NO, STACK, YES, describe, refine, sweep
+from omniplan.batch.rests import CHANGES
+from omniplan.batch.swings import is_swinging, widened
 from omniplan.judging.proof import MAX_HALVINGS, SHARPENING_HALVINGS, SHARPNESS
+from omniplan.report import SHAPE_LIMITS
+from omniplan.standing.standstill import UNREACHABLE
 
 __all__ = ["REFUSED", "UNCLEAR", "VALID", "judge_pairs"]
 
@@ -40,36 +48,27 @@ UNCLEAR, VALID, REFUSED = 0, 1, 2
 """What is said of a pair; unclear ones are left to `validate`."""
 
 PROVING, SHARPENING = np.int64(MAX_HALVINGS), np.int64(SHARPENING_HALVINGS)
+STANDING = np.int64(SHAPE_LIMITS.index("RECONFIGURATION"))
+"""Rank of what is told of a standstill that is too short."""
 LEAST_WORST = 0.05
 """Utilisations below this are not sharpened, as in `Proof.sharpen`."""
 
 
-@njit(cache=True)
-def _told(rows: Array, r: int, ratio: float) -> float:
-    """Value over bound as reports have it: of slip the angles, not their sines."""
-    if rows[r, KIND] == SLIP or rows[r, KIND] == PARALLEL:
-        return math.asin(min(ratio * rows[r, BOUND], 1.0)) / math.asin(rows[r, BOUND])
-    return ratio
-
-
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _describe(
-    knots: Array, is_pose: bool, rows: Array, r: int, vehicle: Array,
+    knots: Array, form: int, rows: Array, r: int, vehicle: Array,
     tolerances: Array, s: Array, place: Array, sign: float, out: Array,
 ) -> None:  # fmt: skip
     """Write time, value and bound of a row at the worse end of a part."""
-    view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
-    knot = knots[int(place[0])]
-    for k in range(LANES):
-        t = place[1] if k == 0 else place[2]
-        enclose(knot, is_pose, t, t, view, k)
-    one_row(s, rows, r, vehicle, tolerances, YES)
-    k = 1 if s[LOW + 1] > s[LOW] else 0
+    k = describe(
+        knots[int(place[0])], form, rows[r : r + 1], vehicle, tolerances, s,
+        (place[1], place[2]),
+    )  # fmt: skip
     out[0] = place[1 + k]
     ratio = s[LOW + k]
     if rows[r, KIND] == SINGULAR:
         out[1], out[2] = s[NA + k], 0.0
-    elif rows[r, KIND] == RANGE:
+    elif rows[r, KIND] == RANGE or rows[r, KIND] == OWN_RANGE:
         aside = angle_of(s, k, False, sign, rows[r, ANGLE])
         out[1], out[2] = (
             rows[r, ANGLE] + aside,
@@ -77,14 +76,14 @@ def _describe(
         )
     elif rows[r, KIND] == SLIP or rows[r, KIND] == PARALLEL:
         out[2] = math.asin(rows[r, BOUND])
-        out[1] = _told(rows, r, ratio) * out[2]
+        out[1] = told(rows, r, ratio) * out[2]
     else:
         out[1], out[2] = ratio * rows[r, BOUND], rows[r, BOUND]
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _settled(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
+    blocks: Array, knot_of: Array, count: int, knots: Array, form: int, rows: Array,
     vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
     halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
     place: Array, ends: Array, pieces: int, by_piece: Array,
@@ -106,7 +105,7 @@ def _settled(
         if broken:
             continue
         low[r], high[r], is_clear = refine(
-            blocks, knot_of, count, knots, is_pose, rows, r, vehicle, tolerances, s,
+            blocks, knot_of, count, knots, form, rows, r, vehicle, tolerances, s,
             highs, skipped, halves, stack, knot_at, NO, count, KEPT, PROVING, NO,
             place[r],
         )  # fmt: skip
@@ -114,7 +113,10 @@ def _settled(
             broken = True
         elif not is_clear and not broken:
             return False
-    by_piece[:pieces] = 0.0
+    for p in range(pieces):
+        for side in range(2):
+            for i in range(3):
+                by_piece[p, side, i] = 0.0
     for r in range(rows.shape[0]):
         if rows[r, SIGN] == 0:
             continue
@@ -126,11 +128,11 @@ def _settled(
                 reached, most, is_clear = low[r], high[r], True
             else:
                 reached, most, is_clear = refine(
-                    blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
+                    blocks, knot_of, count, knots, form, rows, r, vehicle,
                     tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0],
                     ends[p, 1], KEPT, PROVING, YES, place[r],
                 )  # fmt: skip
-            if not is_clear and not broken:
+            if not is_clear and (not broken or rows[r, KIND] == RANGE):
                 return False
             if reached > KEPT:
                 by_piece[p, side, 0] += 1
@@ -139,11 +141,12 @@ def _settled(
     return True
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _judge(
     blocks: Array, groups: Array, knot_of: Array, count: int, knots: Array,
-    is_pose: bool, rows: Array, order: Array, vehicle: Array, tolerances: Array,
-    room: tuple[Array, ...], out: Array,
+    form: int, samples: tuple[Array, ...], rows: Array, order: Array, own_rows: Array,
+    cells: Array, vehicle: Array, tolerances: Array, room: tuple[Array, ...],
+    out: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Return the verdict on one pair, and the row that tells it.
 
@@ -151,7 +154,7 @@ def _judge(
     """
     (
         s, tops, wanted, done, most, highs, skipped, halves, low, high, at, place,
-        stack, knot_at, ends, by_piece, signs,
+        stack, knot_at, ends, by_piece, signs, changes,
     ) = room  # fmt: skip
     n_rows = rows.shape[0]
     pieces = 1
@@ -164,46 +167,131 @@ def _judge(
         blocks, groups, rows, vehicle, tolerances, s, tops, wanted, done, most, highs,
         skipped, low, high, at,
     )  # fmt: skip
-    place[:n_rows, 0] = -1.0
+    for r in range(n_rows):
+        place[r, 0] = -1.0
     if not _settled(
-        blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s, highs,
+        blocks, knot_of, count, knots, form, rows, vehicle, tolerances, s, highs,
         skipped, halves, stack, knot_at, low, high, place, ends, pieces, by_piece,
     ):  # fmt: skip
         return UNCLEAR, -1
-    if vehicle[3] > 0 and not choose(
-        blocks, rows, s, ends, pieces, by_piece, tolerances[3], signs
+    if vehicle[7] > 0 and not _components(
+        blocks, knot_of, knots, rows, cells, vehicle, ends, pieces, low, by_piece
     ):
+        return UNCLEAR, -1
+    if vehicle[3] > 0 and not choose(
+        blocks, knot_of, knots, form, rows, own_rows, vehicle, tolerances, s, ends,
+        pieces, by_piece, changes, signs,
+    ):  # fmt: skip
         return UNCLEAR, -1
     is_valid = True
     for r in range(n_rows):
         if rows[r, SIGN] == 0 and low[r] > KEPT:
             is_valid = False
+    apart = -1
     for p in range(pieces):
-        if vehicle[3] > 0 and by_piece[p, signs[p], 0] > 0:
+        faults = by_piece[p, signs[p], 0] if vehicle[3] > 0 else 0.0
+        if faults == UNREACHABLE:
+            apart = p if apart < 0 else apart
+        elif faults > 0:
             is_valid = False
+    short, used = _shortest(changes, signs, pieces)
+    is_valid &= used <= 1
+    if apart >= 0 and not is_valid:
+        return UNCLEAR, -1
     if is_valid:
         which = _margin(
-            blocks, knot_of, count, knots, is_pose, rows, vehicle, tolerances, s, highs,
+            blocks, knot_of, count, knots, form, rows, vehicle, tolerances, s, highs,
             skipped, halves, stack, knot_at, low, high, place, ends, pieces, signs, out,
         )  # fmt: skip
+        if used > 1 - out[0]:
+            out[0], which = 1 - used, 2 * n_rows + 1
+        if apart >= 0:
+            part = ends[apart, 0]
+            out[1], out[3] = blocks[part // LANES, 15, part % LANES], 0.0
+            return REFUSED, 2 * n_rows
         return VALID, which
-    verdict: tuple[int, int] = _refusal(
-        blocks, knot_of, count, knots, is_pose, rows, order, vehicle, tolerances, s,
-        highs, skipped, halves, stack, knot_at, low, at, place, ends, pieces, signs,
-        out,
+    which = _refusal(
+        blocks, knot_of, count, knots, form, samples, rows, order, vehicle, tolerances,
+        s, highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces,
+        by_piece, signs, out,
     )  # fmt: skip
-    return verdict
+    is_short = 1 < used < np.inf
+    if which == NOWHERE and is_short:
+        which = -1
+    elif which < 0:
+        return UNCLEAR, -1
+    if used > 1:
+        change = changes[short, signs[short], signs[short + 1]]
+        told: tuple[int, int] = _too_short(rows, order, change, used, which, out)
+        return told
+    return REFUSED, which
 
 
-@njit(cache=True)
-def _is_driven(sign: float, pieces: int, signs: Array, steers: bool, p: int) -> bool:
-    """Whether a row of one representation holds in a piece."""
-    return steers and (sign > 0) == (signs[p] == 0) if p < pieces else False
+@kernel()
+def _components(
+    blocks: Array, knot_of: Array, knots: Array, rows: Array, cells: Array,
+    vehicle: Array, ends: Array, pieces: int, low: Array, by_piece: Array,
+) -> bool:  # fmt: skip
+    """Count pieces in another component of the space, as `choose_configurations` does.
+
+    Among the representations worth a look; False if some of that is not known.
+    """
+    broken = False
+    for r in range(rows.shape[0]):
+        broken |= rows[r, SIGN] == 0 and low[r] > KEPT
+    for p in range(pieces):
+        least = min(by_piece[p, 0, 0], by_piece[p, 1, 0])
+        for side in range(2):
+            if by_piece[p, side, 0] > least:
+                continue
+            told = component_of(
+                blocks, knot_of, knots, ends[p, 0], ends[p, 1], 1.0 - 2.0 * side, cells,
+                vehicle,
+            )  # fmt: skip
+            if told == LOST and not broken and least == 0:
+                by_piece[p, side, 0] = UNREACHABLE
+            elif told != REACHED:
+                return False
+    return True
 
 
-@njit(cache=True, inline="always")
+@kernel()
+def _shortest(changes: Array, signs: Array, pieces: int) -> tuple[int, float]:
+    """Return the standstill that is used most, and its share of the time there is."""
+    short, used, telling = -1, 0.0, 0.0
+    for p in range(pieces - 1):
+        change = changes[p, signs[p], signs[p + 1]]
+        share = change[1] / max(change[2], 1e-9) if change[1] > 0.0 else 0.0
+        # A time that is too long tells more than that no way was found.
+        tells = share if share < np.inf else 1 + 1e-12
+        if tells > telling:
+            short, used, telling = p, share, tells
+    return short, used
+
+
+@kernel()
+def _too_short(
+    rows: Array, order: Array, change: Array, used: float, which: int, out: Array
+) -> tuple[int, int]:
+    """Write that the wheels have too little time, unless something else tells more."""
+    n_rows, is_proved = rows.shape[0], used < np.inf
+    out[0] = max(min(out[0], 1 - used), -1e6) if which >= 0 else max(1 - used, -1e6)
+    if which >= 0 and (order[which, 0] < STANDING or not is_proved):
+        return REFUSED, which
+    out[1], out[3] = change[3], change[2]
+    out[2] = change[1] if is_proved else np.nan
+    wheel = np.int64(change[4])
+    for r in range(n_rows):
+        if rows[r, KIND] == SINGULAR:
+            if wheel == 0:
+                return REFUSED, n_rows + r
+            wheel -= 1
+    return REFUSED, 2 * n_rows + 1
+
+
+@kernel(inline="always")
 def _margin(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
+    blocks: Array, knot_of: Array, count: int, knots: Array, form: int, rows: Array,
     vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
     halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
     place: Array, ends: Array, pieces: int, signs: Array, out: Array,
@@ -217,7 +305,7 @@ def _margin(
     for r in range(rows.shape[0]):
         sign = rows[r, SIGN]
         for p in range(pieces if sign != 0 else 1):
-            if sign != 0 and not _is_driven(sign, pieces, signs, steers, p):
+            if sign != 0 and not is_driven(sign, pieces, signs, steers, p):
                 continue
             limit = max(worst, LEAST_WORST) * (1 + SHARPNESS)
             whole = sign == 0 or pieces == 1
@@ -225,7 +313,7 @@ def _margin(
             if most > limit or not whole:
                 first, last = (NO, count) if sign == 0 else (ends[p, 0], ends[p, 1])
                 reached, most, _ = refine(
-                    blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
+                    blocks, knot_of, count, knots, form, rows, r, vehicle,
                     tolerances, s, highs, skipped, halves, stack, knot_at, first, last,
                     limit, SHARPENING, NO, place[r],
                 )  # fmt: skip
@@ -236,60 +324,65 @@ def _margin(
     return which
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _refusal(
-    blocks: Array, knot_of: Array, count: int, knots: Array, is_pose: bool, rows: Array,
-    order: Array, vehicle: Array, tolerances: Array, s: Array, highs: Array,
-    skipped: Array, halves: tuple[Array, Array], stack: Array, knot_at: Array,
-    low: Array, at: Array, place: Array, ends: Array, pieces: int, signs: Array,
-    out: Array,
-) -> tuple[int, int]:  # fmt: skip
-    """Write what refuses a pair and the margin; return the verdict and the row."""
-    steers = vehicle[3] > 0
-    worst, which, rank, told = 0.0, -1, 0, 0.0
-    there = np.empty(3)
-    for r in range(rows.shape[0]):
-        sign = rows[r, SIGN]
-        for p in range(pieces if sign != 0 else 1):
-            if sign != 0 and not _is_driven(sign, pieces, signs, steers, p):
-                continue
-            reached = low[r]
-            if sign != 0 and (pieces > 1 or low[r] > KEPT):
-                reached, _, _ = refine(
-                    blocks, knot_of, count, knots, is_pose, rows, r, vehicle,
-                    tolerances, s, highs, skipped, halves, stack, knot_at, ends[p, 0],
-                    ends[p, 1], np.inf, NO, YES, place[r],
-                )  # fmt: skip
-            worst = max(worst, reached)
-            if reached <= KEPT:
-                continue
-            ratio = _told(rows, r, reached)
-            first = which < 0 or order[r] < rank
-            if first or (order[r] == rank and ratio > told):
-                which, rank, told = r, order[r], ratio
-                there[:] = place[r]
+    blocks: Array, knot_of: Array, count: int, knots: Array, form: int,
+    samples: tuple[Array, ...], rows: Array, order: Array, vehicle: Array,
+    tolerances: Array, s: Array, highs: Array, skipped: Array,
+    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
+    place: Array, ends: Array, pieces: int, by_piece: Array, signs: Array, out: Array,
+) -> int:  # fmt: skip
+    """Write what refuses a pair and the margin; return the row of `headline`."""
+    which, worst = headline(
+        blocks, knot_of, count, knots, form, samples, rows, order, vehicle, tolerances,
+        s, highs, skipped, halves, stack, knot_at, high, place, ends, pieces, signs,
+    )  # fmt: skip
     if which < 0:
-        return UNCLEAR, -1
-    if there[0] < 0:
-        refine(
-            blocks, knot_of, count, knots, is_pose, rows, which, vehicle, tolerances, s,
-            highs, skipped, halves, stack, knot_at, at[which] * LANES,
-            min(count, (at[which] + 1) * LANES), np.inf, NO, YES, there,
-        )  # fmt: skip
+        return which
+    for r in range(rows.shape[0]):
+        if rows[r, SIGN] == 0:
+            worst = max(worst, low[r])
+    for p in range(pieces if vehicle[3] > 0 else 0):
+        worst = max(worst, by_piece[p, signs[p], 1])
     out[0] = max(1 - worst, -1e6)
     _describe(
-        knots, is_pose, rows, which, vehicle, tolerances, s, there,
+        knots, form, rows, which, vehicle, tolerances, s, place[rows.shape[0]],
         1.0 if rows[which, SIGN] >= 0 else -1.0, out[1:],
     )  # fmt: skip
-    return REFUSED, which
+    return which
+
+
+@kernel()
+def _judge_motion(
+    blocks: Array, groups: Array, knot_of: Array, count: int, knots: Array, form: int,
+    samples: tuple[Array, ...], fleet: tuple[Array, ...], tolerances: Array,
+    room: tuple[Array, ...], status: Array, which: Array, numbers: Array,
+) -> None:  # fmt: skip
+    """Judge one motion for all vehicles."""
+    bodies, rows, order, first_row, own_rows, first_own, cells, first_cell = fleet
+    for v in range(bodies.shape[0]):
+        a, b = first_row[v], first_row[v + 1]
+        c, d = first_own[v], first_own[v + 1]
+        e, f = first_cell[v], first_cell[v + 1]
+        status[v], which[v] = _judge(
+            blocks, groups, knot_of, count, knots, form, samples, rows[a:b], order[a:b],
+            own_rows[c:d], cells[e:f], bodies[v], tolerances, room, numbers[v],
+        )  # fmt: skip
+        # Numbers of `Fleet.told`: rows, then their wheels at rest, then what has none.
+        if which[v] >= 2 * (b - a):
+            which[v] += 2 * (rows.shape[0] - (b - a))
+        elif which[v] >= b - a:
+            which[v] += rows.shape[0] - (b - a) + a
+        elif which[v] >= 0:
+            which[v] += a
 
 
 @njit(cache=True, nogil=True)
 def judge_pairs(
-    motions: tuple[Array, ...], start: int, stop: int, fleet: tuple[Array, ...],
-    tolerances: Array, status: Array, which: Array, numbers: Array,
+    motions: tuple[Array, ...], fleet: tuple[Array, ...], tolerances: Array,
+    status: Array, which: Array, numbers: Array,
 ) -> None:  # fmt: skip
-    """Judge motions start to stop - 1 for all vehicles of a fleet.
+    """Judge motions for all vehicles of a fleet.
 
     Without a parallel loop, which would have all of this compiled twice: threads may
     each take some of the motions.
@@ -297,30 +390,37 @@ def judge_pairs(
     Parameters
     ----------
     motions
-        Blocks, knot_of, first, count, knots, is_pose of `Motions`; `groups_of` them.
-    start, stop : int
-    fleet : bodies, rows, order, first of `Fleet`
+        `Motions.arrays` and `Motions.samples`; `groups_of` them.
+    fleet : `arrays` of `Fleet`
     tolerances : (4,) float
         Standstill in m/s, sine of the slip angle, slip speed in m/s, alignment in rad.
     status : (m, n) uint8
         `UNCLEAR`, `VALID` or `REFUSED`.
     which : (m, n) int32
-        The row that refuses a pair, or that the margin of a valid one belongs to; -1
-        if there is none.
+        What refuses a pair, or what the margin of a valid one belongs to, by its number
+        in `Fleet.told`; -1 if there is none.
     numbers : (m, n, 4) float
         Margin; of a refused pair also time in s, value and bound.
     """
-    blocks, knot_of, first, count, knots, is_pose, groups, first_group = motions
-    bodies, rows, order, first_row = fleet
-    most = 1
-    for v in range(bodies.shape[0]):
+    blocks, knot_of, first, count, knots, forms, samples, groups, first_group = motions
+    is_plain, wholes, whole_knot, first_whole = samples
+    rows, first_row = fleet[1], fleet[3]
+    most, swings = 1, is_swinging(rows)
+    for v in range(first_row.size - 1):
         most = max(most, first_row[v + 1] - first_row[v])
-    for n in range(start, stop):
+    for n in range(forms.size):
         wide = LANES * (first[n + 1] - first[n])
+        parts = blocks[first[n] : first[n + 1]]
+        uncut = slice(first_whole[n], first_whole[n + 1])
+        others, their_knot = wholes[uncut], whole_knot[uncut]
+        if swings:
+            parts = widened(parts, knot_of[first[n] : first[n + 1]], knots, forms[n])
+            others = widened(others, their_knot, knots, forms[n])
+        of_samples = (is_plain[first[n] : first[n + 1]], others, their_knot)
         of_motion = groups[first_group[n] : first_group[n + 1]]
         room = (
             np.zeros(ROOM),
-            np.empty(LANES * most * of_motion.shape[0]),
+            np.empty((most, LANES * of_motion.shape[0])),
             np.empty(most),
             np.empty(most),
             np.empty(2 * LANES * most),
@@ -330,19 +430,16 @@ def judge_pairs(
             np.empty(most),
             np.empty(most),
             np.empty(most, np.int64),
-            np.empty((most, 3)),
-            np.empty((STACK, 4)),
-            np.empty(STACK, np.int64),
+            np.empty((most + 2, 3)),
+            np.empty((STACK + LANES, 4)),
+            np.empty(STACK + LANES, np.int64),
             np.empty((MAX_PIECES, 2), np.int64),
             np.empty((MAX_PIECES, 2, 3)),
             np.empty(MAX_PIECES, np.int64),
+            np.empty((MAX_PIECES, 2, 2, CHANGES)),
         )
-        for v in range(bodies.shape[0]):
-            a, b = first_row[v], first_row[v + 1]
-            status[n, v], which[n, v] = _judge(
-                blocks[first[n] : first[n + 1]], of_motion, knot_of[first[n]
-                : first[n + 1]], count[n], knots, is_pose[n], rows[a:b], order[a:b],
-                bodies[v], tolerances, room, numbers[n, v],
-            )  # fmt: skip
-            if which[n, v] >= 0:
-                which[n, v] += a
+        _judge_motion(
+            parts, of_motion, knot_of[first[n] : first[n + 1]], count[n], knots,
+            forms[n], of_samples, fleet, tolerances, room, status[n], which[n],
+            numbers[n],
+        )  # fmt: skip

@@ -14,6 +14,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import TypeAdapter
 
 from configspace import (
@@ -24,6 +26,7 @@ from configspace import (
     exact_v_max,
     from_twist,
 )
+from configspace.omni_curve import components
 from configspace.space import require_space
 from omniplan.choosing.requirements import (
     WAYS,
@@ -51,6 +54,10 @@ __all__ = [
     "suitable",
 ]
 
+FloatArray = npt.NDArray[np.float64]
+
+TIGHTER = 200
+"""So many curves are tried that are as tight as one asked for, or tighter."""
 ROUNDING = 1e-12
 """A demand counts as met up to this relative excess: the rounding of float64."""
 
@@ -260,6 +267,8 @@ class _Motion:
     asked: float
     """The speed that is asked for, 0: any."""
     unit: str
+    or_tighter: bool = False
+    """Whether any curve that is at least as tight will do."""
 
 
 _SIDES = (("to the left", 1), ("to the right", -1))
@@ -291,7 +300,8 @@ def _motions(
                 # The centre of the circle lies on that side of the vehicle.
                 omega = sign * direction * abs(v) / asked.radius
                 what = f"{way}, centre {side}"
-                yield _Motion(what, (v.real, v.imag, omega), asked.speed, "m/s")
+                twist = (v.real, v.imag, omega)
+                yield _Motion(what, twist, asked.speed, "m/s", or_tighter=True)
 
 
 def _driven(
@@ -306,8 +316,11 @@ def _driven(
         kappa_n, beta, v_s = (
             float(x) for x in from_twist(motion.twist, space.kappa_g, sign)
         )
-        bound = _v_max(space, (kappa_n, beta), v_s < 0, allow_unreachable)
-        share = bound / abs(v_s)
+        curves = _curves(kappa_n) if motion.or_tighter else np.array([kappa_n])
+        bounds = _v_max(space, curves, beta, v_s < 0, allow_unreachable)
+        if motion.or_tighter:  # the tighter the curve, the less of v_s is K's speed
+            bounds *= components(curves)[0] / components(kappa_n)[0]
+        share = float((bounds / abs(v_s)).max())
         if share > 0 and share >= (1 - ROUNDING) * (motion.asked > 0):
             return
         why, who = space.explain(kappa_n, beta, reverse=v_s < 0)
@@ -328,15 +341,26 @@ def _driven(
     )
 
 
+def _curves(kappa_n: float) -> FloatArray:
+    """Return this κ_n and tighter ones, (TIGHTER,), without turning on the spot."""
+    return np.linspace(kappa_n, math.copysign(2.0, kappa_n), TIGHTER + 1)[:-1]
+
+
 def _v_max(
     space: PermissibleSpace,
-    at: tuple[float, float],
+    kappa_n: FloatArray,
+    beta: float,
     reverse: bool,
     allow_unreachable: bool,
-) -> float:
-    """Return v_max at (κ_n, β), exact where the vehicle is known, m/s."""
+) -> FloatArray:
+    """Return v_max at (κ_n, β), exact where the vehicle is known, (n,) m/s."""
     reachable_only = not allow_unreachable
-    table = space.v_max(*at, reverse=reverse, reachable_only=reachable_only)
-    if table == 0 or space.vehicle is None:
-        return float(table)
-    return float(exact_v_max(space.vehicle, *at, reverse=reverse))
+    betas = np.full(kappa_n.shape, beta)
+    found = np.array(
+        space.v_max(kappa_n, betas, reverse=reverse, reachable_only=reachable_only),
+        dtype=np.float64,
+    )
+    if space.vehicle is not None and (free := found > 0).any():
+        exact = exact_v_max(space.vehicle, kappa_n[free], betas[free], reverse=reverse)
+        found[free] = exact
+    return found

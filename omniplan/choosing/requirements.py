@@ -8,7 +8,7 @@ phrase                          value
 ==============================  =====================================================
 turn on the spot at 45 deg/s    `TurnOnTheSpot`, about K, to both sides
 crab 90 deg at 0.5 m/s          `Crab`, without turning, to both sides
-radius 0.8 m at 1 m/s           `Radius` of K's way, to both sides; forwards
+radius 0.8 m at 1 m/s           `Radius` of K's way, at most; to both sides; forwards
 speed 1.5 m/s backwards         `Speed` straight on
 payload 500 kg                  `Payload`
 footprint 1.2 m x 0.8 m         `FitsWithin`, along x and y of the vehicle
@@ -69,7 +69,7 @@ class TurnOnTheSpot:
     """|ω|, rad/s; 0: any."""
 
     def __post_init__(self) -> None:
-        _require("turn on the spot: rate", self.rate, 0, 1e3, "rad/s")
+        _require_angle("turn on the spot: rate", self.rate, 0, 1e3, "deg/s")
 
     def __str__(self) -> str:
         """Return the phrase."""
@@ -89,7 +89,7 @@ class Crab:
     """Of K, m/s; 0: any."""
 
     def __post_init__(self) -> None:
-        _require("crab: angle", self.angle, 1e-6, math.pi, "rad")
+        _require_angle("crab: angle", self.angle, 1e-6, math.pi, "deg")
         _require("crab: speed", self.speed, 0, 100, "m/s")
 
     def __str__(self) -> str:
@@ -99,14 +99,16 @@ class Crab:
 
 @dataclass(frozen=True)
 class Radius:
-    """A circle of this radius, to the left and to the right, tangentially.
+    """A circle of this radius or a smaller one, to the left and to the right.
 
-    K goes round the circle while the vehicle looks along it (β as straight ahead). At
-    exactly this radius, which is more than "some radius up to it".
+    K goes round the circle while the vehicle looks along it (β as straight ahead). Of
+    the smaller circles so many are tried as `omniplan.choosing.fitness` has it, evenly
+    in κ_n up to turning on the spot; what is permitted only between two of them is a
+    no.
     """
 
     radius: float
-    """Of K's way, m, > 0."""
+    """Of K's way, at most, m, > 0."""
     speed: float = 0.0
     """Of K, m/s; 0: any."""
     way: Way = "forwards"
@@ -307,6 +309,17 @@ def _require(where: str, value: float, low: float, high: float, unit: str) -> No
     if not low <= value <= high:  # nor where it is NaN
         allowed = f"a number from {low:g} to {high:g} {unit}"
         raise InvalidInput(Problem(where, repr(value)[:40], allowed))
+
+
+def _require_angle(
+    where: str, value: float, low: float, high: float, unit: str
+) -> None:
+    """Raise in degrees, as the phrase has them, unless radians are within bounds."""
+    if not low <= value <= high:
+        least, most = math.degrees(low), math.degrees(high)
+        given = f"{math.degrees(value):.6g} {unit}"
+        allowed = f"a number from {least:.3g} to {most:.6g} {unit}"
+        raise InvalidInput(Problem(where, given, allowed))
 
 
 def _require_way(where: str, way: str) -> None:

@@ -7,9 +7,10 @@ The columns are those of `omniplan.inputs.table`.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from os import PathLike
 from pathlib import Path as FilePath
 
-from configspace import Problem, Vehicle
+from configspace import InvalidInput, Problem, Vehicle
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.table import columns_of, trajectories_of
 from omniplan.path import Path
@@ -73,14 +74,18 @@ def write_trajectories(
     Raises
     ------
     InvalidInput
-        If there are none, or their forms differ.
+        If there are none, their forms differ, or the arguments are swapped.
     InvalidTrajectory
         If the name of the file ends in ``.json``.
     """
+    if not isinstance(path, str | PathLike):
+        allowed = "the name of a file, before what is written to it"
+        raise InvalidInput(Problem("path", type(path).__name__, allowed))
+    trajectories = _listed(trajectories)
     path = FilePath(path)
     if path.suffix.lower() == ".json":
         raise InvalidTrajectory(Problem(f"{path}", "JSON", ".csv or .parquet"))
-    table = columns_of(tuple(trajectories))
+    table = columns_of(trajectories)
     if path.suffix.lower() == ".parquet":
         from omniplan.inputs.parquet_files import write_parquet
 
@@ -89,3 +94,16 @@ def write_trajectories(
         from omniplan.inputs.csv_files import write_csv
 
         write_csv(path, *table)
+
+
+def _listed(motions: object) -> tuple[Trajectory | Path, ...]:
+    """Return what is to be written; InvalidInput for anything else."""
+    allowed = "a list of trajectories or paths"
+    if isinstance(motions, str) or not isinstance(motions, Iterable):
+        raise InvalidInput(Problem("trajectories", type(motions).__name__, allowed))
+    found = tuple(motions)
+    for i, one in enumerate(found):
+        if not isinstance(one, Trajectory | Path):
+            where = f"trajectories[{i}]"
+            raise InvalidInput(Problem(where, type(one).__name__, allowed))
+    return found

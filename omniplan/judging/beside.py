@@ -12,13 +12,14 @@ import numpy.typing as npt
 from configspace.limits import SectorRow
 from configspace.omni_curve import POLE
 from configspace.vehicle import SteerableWheel
-from omniplan.judging.chords import Change, Chord, over
+from omniplan.judging.chords import Change, Chord, excess, growth_excess, over
 from omniplan.judging.rows import Bounds
 from omniplan.motion import Enclosure
 
-__all__ = ["beside_axis", "zone_bounds"]
+__all__ = ["beside_axis", "beside_gain", "zone_bounds"]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 def beside_axis(
@@ -60,7 +61,8 @@ def beside_axis(
         if offset:
             levers = offset, coupling
             yield over(
-                _offset_speed(levers, part, chord, own, turn, rate, moving), limit
+                _offset_speed(levers, part, chord, change, own, turn, rate, moving),
+                limit,
             )
         elif coupling:
             sizes = np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1
@@ -76,6 +78,7 @@ def _offset_speed(
     levers: tuple[float, float],
     part: Enclosure,
     chord: Chord,
+    change: Change,
     own: FloatArray,
     turn: list[FloatArray],
     rate: Bounds,
@@ -104,9 +107,7 @@ def _offset_speed(
             )
         )
     )
-    # What ω + α̇ may differ by from its ends.
-    slack = part.dt**2 / 8 * part.omega_ddot
-    slack = slack + rate[1] - np.maximum(*(np.abs(t) for t in turn))
+    slack = _turning_excess(part, chord, change)
     ends = [own * (w + t) * offset for w, t in zip(omega, turn, strict=True)]
     most = np.maximum(*ends) + slack * abs(offset)
     least = np.minimum(*ends) - slack * abs(offset)
@@ -119,6 +120,76 @@ def _offset_speed(
     # Without shared motors not 0 times a rate that may be infinite.
     shared = coupling * rate[1] if coupling else 0.0
     return low, np.where(plain, high, total) + shared
+
+
+def _turning_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:
+    """Return what ω + α̇ may exceed its values at both ends by.
+
+    Both together: one may rise while the other falls. See `swing` for α̈ and α⃛.
+    """
+    yaw_gain = np.maximum(np.abs(part.omega_dot0), np.abs(part.omega_dot1))
+    yaw_gain = yaw_gain + excess(part, part.omega_ddot, part.omega_dddot)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        l_1, l_2, l_3 = (
+            x / chord.near for x in (change.far, change.bend, change.third)
+        )
+        slope = yaw_gain + l_2 + l_1**2
+        bend = part.omega_ddot + l_3 + 3 * l_1 * l_2 + 2 * l_1**3
+        return np.where(chord.near > 0, excess(part, slope, bend), np.inf)
+
+
+def beside_gain(
+    wheel: SteerableWheel,
+    offset: float,
+    part: Enclosure,
+    point: complex,
+    own: FloatArray,
+    rolls: tuple[BoolArray, BoolArray],
+) -> Bounds:
+    """Return bounds on how fast the rolling speed of a wheel beside its axis changes.
+
+    ``|dû/dt| + k |α̈|``, with ``dû/dt = σ d|U|/dt - (ω̇ + α̈) D``; k for shared motors.
+
+    Parameters
+    ----------
+    wheel : SteerableWheel
+    offset : float, m
+        D, > 0: left of its axis.
+    part : Enclosure
+        With `Enclosure.swing`.
+    point : complex, m
+        The wheel's axis in the frame of the vehicle's file.
+    own : (m,) float
+        Sign of v_s, σ.
+    rolls : two (m,) bool
+        Whether the wheel's axis moves at an end.
+    """
+    assert part.swing is not None
+    chord, change = Chord.of(part, point), Change.of(part, point)
+    swung, most = part.swing.directions.accelerations(point)
+    swing_excess = most - np.abs(swung).max(axis=0)
+    ends, counted = [], []
+    for u, d, gain, bent, does_roll in zip(
+        (chord.a, chord.b),
+        (change.a, change.b),
+        (part.omega_dot0, part.omega_dot1),
+        swung,
+        rolls,
+        strict=True,
+    ):
+        speeding = (d * u.conj()).real / np.maximum(np.abs(u), 1e-300)
+        rolled = np.abs(speeding - own * (gain + bent) * offset)
+        ends.append(rolled + wheel.steering_coupling * np.abs(bent))
+        counted.append(np.where(does_roll, ends[-1], 0.0))
+    low = np.maximum(*counted)
+    lever = abs(offset) + wheel.steering_coupling
+    turned = np.maximum(np.abs(part.omega_dot0), np.abs(part.omega_dot1))
+    turned_excess = excess(part, part.omega_ddot, part.omega_dddot)
+    fine = growth_excess(part, chord, change) + abs(offset) * turned_excess
+    # Where the wheel may stand there is no bound on its growth.
+    fine = np.maximum(*ends) + fine + lever * swing_excess
+    coarse = change.far + abs(offset) * (turned + turned_excess) + lever * most
+    return low, np.minimum(fine, coarse)
 
 
 def zone_bounds(

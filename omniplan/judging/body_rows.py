@@ -14,6 +14,7 @@ from configspace.limits import GRAVITY, center_of_gravity
 from omniplan.judging.chords import (
     Change,
     Chord,
+    excess,
     growth,
     off_line,
     over,
@@ -107,8 +108,15 @@ class BodyRows:
         at_ends = np.maximum(
             np.abs(v.a * yaw.a) * part.scale0**2, np.abs(v.b * yaw.b) * part.scale1**2
         )
+        change, gain = Change.of(part, point), yaw_change(part)
+        # |ω v|: d/dt (ω v) = ω̇ v + ω v̇, and so on
+        slope = gain.far * v.far + yaw.far * change.far
+        bend = gain.bend * v.far + 2 * gain.far * change.far + yaw.far * change.bend
+        bent = at_ends + excess(part, slope, bend)
+        product = v.far * yaw.far * part.scale_high**2
+        high = np.where(is_plain(part), np.minimum(bent, product), product)
         row = Row("LATERAL_ACCELERATION", -1, limit, "m/s²", "acceleration")
-        yield row, over((at_ends, v.far * yaw.far * part.scale_high**2), limit)
+        yield row, over((at_ends, high), limit)
 
     def _tipping(self, part: Enclosure) -> Iterator[tuple[Row, Bounds]]:
         """Yield the acceleration of the centre of gravity towards every edge.
@@ -121,26 +129,23 @@ class BodyRows:
         point = center_of_gravity(self._vehicle)
         v, change, yaw = Chord.of(part, point), Change.of(part, point), yaw_of(part)
         ends = [1j * yaw.a * v.a * part.scale0**2, 1j * yaw.b * v.b * part.scale1**2]
-        turning = np.maximum(np.abs(part.omega_dot0), np.abs(part.omega_dot1))
-        turning = turning + part.dt / 2 * part.omega_ddot
+        gain = yaw_change(part)
         # d/dt (j ω v) = j (ω̇ v + ω v̇)
-        bend = turning * v.far + yaw.far * change.far
+        slope = gain.far * v.far + yaw.far * change.far
+        bend = gain.bend * v.far + 2 * gain.far * change.far + yaw.far * change.bend
         if self._has_rates:
             ends = [ends[0] + change.a, ends[1] + change.b]
-            bend = bend + change.bend
+            slope, bend = slope + change.bend, bend + change.third
+        more = excess(part, slope, bend)
         height = load.center_of_gravity[2]
         grow = np.maximum(part.scale_high, 1e-300) ** 2
-        known = part.scale_high == 1
+        known = is_plain(part)
         for normal, distance in self._vehicle.tipping_edges:
             limit = distance * GRAVITY / (load.tipping_factor * height)
             towards = [(a * normal.conjugate()).real for a in ends]
             low = np.maximum(np.maximum(*towards), 0.0)
             # With a varying factor on the twist: its largest on the largest size.
-            high = np.where(
-                known,
-                low + part.dt / 2 * bend,
-                v.far * yaw.far * grow,
-            )
+            high = np.where(known, low + more, v.far * yaw.far * grow)
             row = Row("TIPPING", -1, limit, "m/s²", "acceleration")
             yield row, over((low, high), limit)
 
@@ -167,6 +172,22 @@ class BodyRows:
             if limit is not None:
                 row = Row(name, -1, limit, "m/s²", "acceleration")
                 yield row, over(growth(part, body, change, side), limit)
+
+
+def is_plain(part: Enclosure) -> BoolArray:
+    """Return where the twist has no factor."""
+    is_one = (part.scale0 == 1) & (part.scale1 == 1) & (part.scale_high == 1)
+    return np.asarray(is_one, dtype=bool)
+
+
+def yaw_change(part: Enclosure) -> Change:
+    """Return ω̇ on the real axis."""
+    first, last = (
+        np.asarray(w, dtype=np.complex128) for w in (part.omega_dot0, part.omega_dot1)
+    )
+    bend, third = part.omega_ddot, part.omega_dddot
+    far = np.maximum(np.abs(first), np.abs(last)) + excess(part, bend, third)
+    return Change(first, last, bend, third, far)
 
 
 def yaw_of(part: Enclosure) -> Chord:

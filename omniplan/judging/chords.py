@@ -18,8 +18,11 @@ __all__ = [
     "along",
     "changed",
     "ends_moving",
+    "excess",
     "growth",
+    "growth_excess",
     "off_line",
+    "one_way",
     "over",
     "scaled",
     "size",
@@ -77,6 +80,8 @@ class Change:
     b: ComplexArray
     bend: FloatArray
     """Bound on the second derivative."""
+    third: FloatArray
+    """Bound on the third derivative."""
     far: FloatArray
     """Bound on the first derivative."""
 
@@ -86,8 +91,21 @@ class Change:
         a = part.v_dot0 + 1j * part.omega_dot0 * point
         b = part.v_dot1 + 1j * part.omega_dot1 * point
         bend = part.v_ddot + part.omega_ddot * abs(point)
-        far = np.maximum(np.abs(a), np.abs(b)) + part.dt / 2 * bend
-        return cls(a, b, bend, far)
+        third = part.v_dddot + part.omega_dddot * abs(point)
+        far = np.maximum(np.abs(a), np.abs(b)) + excess(part, bend, third)
+        return cls(a, b, bend, third, far)
+
+
+def excess(part: Enclosure, slope: FloatArray, bend: FloatArray) -> FloatArray:
+    """Return by how much a value may exceed those at both ends of a part.
+
+    Parameters
+    ----------
+    part : Enclosure
+    slope, bend : (m,) float
+        Bounds on its first and on its second derivative.
+    """
+    return np.asarray(np.minimum(part.dt / 2 * slope, part.dt**2 / 8 * bend))
 
 
 def speed_of(part: Enclosure, body: Chord, kappa_g: float) -> Bounds:
@@ -146,9 +164,9 @@ def along(chord: Chord, turn: complex) -> Chord:
 def changed(part: Enclosure, change: Change, turn: complex) -> Change:
     """Return the derivative of a component."""
     a, b = _real(change.a * turn), _real(change.b * turn)
-    bend = change.bend * abs(turn)
-    far = np.maximum(np.abs(a), np.abs(b)) + part.dt / 2 * bend
-    return Change(a, b, bend, far)
+    bend, third = change.bend * abs(turn), change.third * abs(turn)
+    far = np.maximum(np.abs(a), np.abs(b)) + excess(part, bend, third)
+    return Change(a, b, bend, third, far)
 
 
 def size(vector: Chord | Change) -> Bounds:
@@ -173,44 +191,70 @@ def turning(
     change: Change,
     rolls: tuple[BoolArray, BoolArray],
 ) -> Bounds:
-    """Return bounds on |d arg U / dt| = |Im(U̇ Ū)| / |U|²."""
+    """Return bounds on |d arg U / dt| = |Im(U̇ Ū)| / |U|²; see `swing` for the bend."""
     ends = [
         np.abs((d * u.conj()).imag)
         for u, d in ((chord.a, change.a), (chord.b, change.b))
     ]
     at_ends = [
-        np.where(moves, n / np.maximum(np.abs(u) ** 2, 1e-300), 0.0)
-        for n, u, moves in zip(ends, (chord.a, chord.b), rolls, strict=True)
+        n / np.maximum(np.abs(u) ** 2, 1e-300)
+        for n, u in zip(ends, (chord.a, chord.b), strict=True)
     ]
-    low = np.maximum(*at_ends)
+    counted = (np.where(m, rate, 0.0) for m, rate in zip(rolls, at_ends, strict=True))
+    low = np.maximum(*counted)
     # d/dt Im(U̇ Ū) = Im(Ü Ū)
     more = part.dt / 2 * change.bend * chord.far
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        high = np.where(
-            chord.near > 0, (np.maximum(*ends) + more) / chord.near**2, np.inf
+        steep = (np.maximum(*ends) + more) / chord.near**2
+        l_1, l_2, l_3 = (
+            x / chord.near for x in (change.far, change.bend, change.third)
         )
+        swung = excess(part, l_2 + l_1**2, l_3 + 3 * l_1 * l_2 + 2 * l_1**3)
+        bent = np.maximum(*at_ends) + swung
+        high = np.where(chord.near > 0, np.fmin(steep, bent), np.inf)
     return low, high
 
 
+def one_way(part: Enclosure, chord: Chord, change: Change) -> BoolArray:
+    """Return whether the direction of U surely never turns back over a part.
+
+    ``Im(U̇ Ū)`` keeps its sign if both ends together exceed what it may change by.
+    """
+    first, last = (
+        (d * u.conj()).imag for u, d in ((chord.a, change.a), (chord.b, change.b))
+    )
+    may_change = part.dt * change.bend * chord.far
+    return np.asarray((chord.near > 0) & (np.abs(first + last) >= may_change))
+
+
+def growth_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:
+    """Return by how much d|U|/dt may exceed its values at both ends; see `growth`."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        l_1 = change.far / chord.near
+        slope = change.bend + change.far * l_1
+        bend = change.third + 6 * change.bend * l_1 + 3 * change.far * l_1**2
+        return np.where(chord.near > 0, excess(part, slope, bend), np.inf)
+
+
 def growth(part: Enclosure, chord: Chord, change: Change, side: int) -> Bounds:
-    """Return bounds on d|U|/dt; `side` 1 only growth, -1 only decline, 0 both."""
+    """Return bounds on d|U|/dt; `side` 1 only growth, -1 only decline, 0 both.
+
+    With r = |U|: ``ṙ = Re(U̇ Ū)/r``, ``|r̈| ≤ |Ü| + |U̇|²/r`` and ``|r⃛| ≤ |U⃛| +
+    6 |Ü| |U̇|/r + 3 |U̇|³/r²``.
+    """
     ends = [(d * u.conj()).real for u, d in ((chord.a, change.a), (chord.b, change.b))]
     sizes = np.abs(chord.a), np.abs(chord.b)
     weigh = np.abs if side == 0 else lambda x: np.maximum(side * x, 0.0)
-    low = np.maximum(
-        *(
-            weigh(n) / np.maximum(s, 1e-300) * (s > 1e-9)
-            for n, s in zip(ends, sizes, strict=True)
-        )
-    )
+    reached = [
+        weigh(n) / np.maximum(s, 1e-300) for n, s in zip(ends, sizes, strict=True)
+    ]
+    low = np.maximum(*(r * (s > 1e-9) for r, s in zip(reached, sizes, strict=True)))
     # d/dt Re(U̇ Ū) = Re(Ü Ū) + |U̇|²; and never more than |U̇|.
     more = part.dt / 2 * (change.bend * chord.far + change.far**2)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        steep = np.where(
-            chord.near > 0,
-            (np.maximum(*(weigh(n) for n in ends)) + more) / chord.near,
-            np.inf,
-        )
+        steep = (np.maximum(*(weigh(n) for n in ends)) + more) / chord.near
+        bent = np.maximum(*reached) + growth_excess(part, chord, change)
+        steep = np.where(chord.near > 0, np.fmin(steep, bent), np.inf)
     high = np.minimum(steep, change.far)
     # Into rest |U| only declines, out of rest it only grows, while U̇ keeps its way.
     still = sizes[1 if side > 0 else 0] <= 1e-9

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from omniplan.judging.chords import Chord, speed_of
+from omniplan.judging.chords import Chord, ends_moving, speed_of
 from omniplan.judging.rows import Judge, Row, Tolerances
 from omniplan.motion import Enclosure, Intervals, Motion
 
@@ -17,6 +18,8 @@ __all__ = ["Parts", "Piece", "Proof", "refused"]
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 SignArray = npt.NDArray[np.int64]
+IntArray = npt.NDArray[np.int64]
+Bounds: TypeAlias = dict[int, FloatArray]
 
 ROUNDING = 1e-12
 """A limit counts as kept up to this relative excess: the rounding of float64."""
@@ -24,8 +27,9 @@ RESOLUTION = 1e-6
 """Parts are halved until low and high utilisation differ by less than this ..."""
 MAX_HALVINGS = 24
 """... or this often ..."""
-MAX_PARTS = 100_000
-"""... or until there are this many; what is undecided then is refused."""
+MAX_PARTS = 30_000
+"""... or until there are so many more than there were; what is undecided then is
+refused."""
 SHARPNESS = 1e-3
 """How sharply the worst utilisation is determined, relative ..."""
 SHARPENING_HALVINGS = 10
@@ -48,9 +52,9 @@ class Parts:
     enclosure: Enclosure
     stands: BoolArray
     """(m,) whether the vehicle stands all over a part."""
-    low: dict[int, FloatArray]
+    low: Bounds
     """(m, rows) utilisation that is reached, per representation."""
-    high: dict[int, FloatArray]
+    high: Bounds
     """(m, rows) utilisation that is never exceeded."""
     angles: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     """Followed steering angles at both ends, (m,) rad, by the row of the wheel's range;
@@ -65,6 +69,30 @@ class Parts:
         firsts = moving[np.concatenate([[0], breaks + 1])]
         lasts = moving[np.concatenate([breaks, [moving.size - 1]])]
         return [Piece(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+
+    def merged(self, others: Parts, spans: Intervals, order: IntArray) -> Parts:
+        """Return parts of both: these and then the others, in a new order.
+
+        Parameters
+        ----------
+        others : Parts
+            Of the same motion.
+        spans : Intervals
+            Of the parts in their new order, (n,).
+        order : (n,) int
+            Indices into all of them.
+        """
+
+        def picked(ours: Bounds, theirs: Bounds) -> Bounds:
+            return {s: np.concatenate([ours[s], theirs[s]])[order] for s in ours}
+
+        return Parts(
+            spans,
+            self.enclosure.merged(others.enclosure, order),
+            np.concatenate([self.stands, others.stands])[order],
+            picked(self.low, others.low),
+            picked(self.high, others.high),
+        )
 
     def picked(self, sign: SignArray) -> tuple[FloatArray, FloatArray]:
         """Return low and high of the representation chosen for each part.
@@ -106,7 +134,24 @@ def refused(low: FloatArray, high: FloatArray, rows: Sequence[Row]) -> BoolArray
 class Proof:
     """Parts of one motion under one judge, refined step by step."""
 
-    def __init__(self, motion: Motion, judge: Judge, tolerances: Tolerances) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        judge: Judge,
+        tolerances: Tolerances,
+        max_parts: int | None = None,
+    ) -> None:
+        """Take a motion and who judges it.
+
+        Parameters
+        ----------
+        motion : Motion
+        judge : Judge
+        tolerances : Tolerances
+        max_parts : int, optional
+            How many more parts there may be than the motion has intervals.
+        """
+        self._max_parts = MAX_PARTS if max_parts is None else max_parts
         self._motion, self._judge, self._tolerances = motion, judge, tolerances
         self.is_own = motion.is_own
         ambiguous = judge.needs_configuration and not motion.is_own
@@ -115,7 +160,7 @@ class Proof:
         self._is_shape = np.array([row.scaling == "none" for row in judge.rows])
         spans = motion.intervals()
         self._step = spans.t1 - spans.t0
-        self.parts = self._evaluate(spans)
+        self.first = self.parts = self._evaluate(spans)
 
     def _evaluate(self, spans: Intervals) -> Parts:
         part = self._motion.enclose(spans)
@@ -147,6 +192,26 @@ class Proof:
             need |= is_open.any(axis=1) & ~broken.any(axis=1)
             shape_open = is_open[:, self._is_shape].any(axis=1)
             need |= shape_open & ~broken[:, self._is_shape].any(axis=1)
+        return need
+
+    def separate(self) -> None:
+        """Halve parts beside a moment of rest until one of them stands all along.
+
+        A motion may pass through rest without pausing there. What lies before and
+        after are two pieces, wherever parts are halved for the sake of a limit.
+        """
+        if not self.is_own:
+            self._halve(self._beside_rest, MAX_HALVINGS)
+
+    def _beside_rest(self, parts: Parts) -> BoolArray:
+        e, kappa_g = parts.enclosure, self._judge.kappa_g
+        body = Chord.of(e, self._judge.reference)
+        starts, ends = ends_moving(e, body, kappa_g, self._tolerances.standstill)
+        rests = (ends[:-1] == 0) & (starts[1:] == 0)
+        rests &= ~parts.stands[:-1] & ~parts.stands[1:]
+        need = np.zeros(parts.stands.shape, dtype=bool)
+        need[:-1] |= rests
+        need[1:] |= rests
         return need
 
     def sharpen(self, sign_of: Callable[[Intervals], SignArray]) -> None:
@@ -193,6 +258,18 @@ class Proof:
             need = wanted(self.parts)
             spans = self.parts.spans
             need &= spans.t1 - spans.t0 > smallest[spans.knot]
-            if not need.any() or need.size + np.count_nonzero(need) > MAX_PARTS:
+            more = need.size + np.count_nonzero(need) - self._step.size
+            if not need.any() or more > self._max_parts:
                 return
-            self.parts = self._evaluate(spans.halved(need))
+            self.parts = self._halved(need)
+
+    def _halved(self, need: BoolArray) -> Parts:
+        """Return the parts with those of `need` cut in two; the others are kept."""
+        spans, halves = self.parts.spans, np.where(need, 2, 1)
+        # Both halves of part i count as part i; new ones follow after all old ones.
+        origin = np.repeat(np.arange(need.size), halves)
+        is_new = need[origin]
+        order = np.where(is_new, need.size + np.cumsum(is_new) - 1, origin)
+        spans = spans.halved(need)
+        new = Intervals(spans.knot[is_new], spans.t0[is_new], spans.t1[is_new])
+        return self.parts.merged(self._evaluate(new), spans, order)

@@ -14,8 +14,10 @@ where l_k bounds |L_k|. Between two times a value thus exceeds those at the ends
 more than ``Δt/2 max|α⃛|``, and by no more than ``Δt²/8 max|α⁗|``.
 
 Where a motion comes to rest all of this would be 0 / 0. But there the twist is a real
-factor, ``t - t_rest``, times one that is not zero; it has the same directions and is
-what is looked at.
+factor, ``τ = t - t_rest``, times one that is not zero; it has the same directions and
+is what is looked at. Shortly before and after, where the twist is nearly such a
+product, it is divided by τ as well: its size then hardly changes, and L_1 tells of
+directions.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ __all__ = ["Directions", "Swing", "directions_of_legs", "factored", "swinging"]
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 Number = TypeVar("Number", np.float64, np.complex128)
 
 TINY = 1e-300
@@ -59,6 +62,11 @@ class Directions:
         """Return the ends, and bounds on |L_1| to |L_4|; infinite if unknown."""
         d = self.v + 1j * self.omega * point
         most = self.v_most + self.omega_most * abs(point)
+        # Where v and jωr cancel, near the centre of rotation, the ends tell more.
+        at_ends, bent = np.abs(d).max(axis=1), self.dt**2 / 8
+        for order in (2, 1):
+            near_ends = at_ends[order] + bent * most[order + 1]
+            most[order - 1] = np.minimum(most[order - 1], near_ends)
         start, end = d[0]
         chord = end - start
         length = np.abs(chord) ** 2
@@ -127,9 +135,11 @@ class Swing:
     h: FloatArray
     """(2, m) s: the ends, since the sample before."""
     speed: ComplexArray
-    """(3, m): p' over a real factor, coefficients in h, highest power first."""
+    """(4, m): p' over a real factor, coefficients of h², h, 1 and 1 / τ."""
     turn: FloatArray
-    """(3, m): θ' over the same factor."""
+    """(4, m): θ' over the same factor."""
+    since: FloatArray
+    """(m,) s: ``τ = since + h``; infinite where the last coefficients are 0."""
     heading: FloatArray
     """(4, m): θ."""
     point: complex
@@ -139,21 +149,40 @@ class Swing:
     def nothing(cls) -> Swing:
         """Return no parts at all."""
         none, pair = np.zeros(0), np.zeros((2, 0))
-        speed = np.zeros((3, 0), dtype=np.complex128)
-        return cls(none, pair, speed, np.zeros((3, 0)), np.zeros((4, 0)), 0j)
+        speed = np.zeros((4, 0), dtype=np.complex128)
+        return cls(none, pair, speed, np.zeros((4, 0)), none, np.zeros((4, 0)), 0j)
 
     def only(self, end: int) -> Swing:
         """Return the parts shrunk to one of their ends, 0 or 1."""
         h = np.stack([self.h[end], self.h[end]])
         zero = np.zeros_like(self.dt)
-        return Swing(zero, h, self.speed, self.turn, self.heading, self.point)
+        held = self.speed, self.turn, self.since, self.heading, self.point
+        return Swing(zero, h, *held)
+
+    def merged(self, others: Swing, order: IntArray) -> Swing:
+        """Return parts of both: these and then the others, in a new order.
+
+        Parameters
+        ----------
+        others : Swing
+            Of the same point.
+        order : (n,) int
+            Indices into all of them.
+        """
+        names = "dt", "h", "speed", "turn", "since", "heading"
+        fields = {
+            name: np.concatenate([getattr(self, name), getattr(others, name)], axis=-1)
+            for name in names
+        }
+        picked = {name: values[..., order] for name, values in fields.items()}
+        return Swing(**picked, point=self.point)
 
     @cached_property
     def directions(self) -> Directions:
         """The twist over the factor, ``e^{-jθ} P - j Q r`` and ``Q``."""
         h, dt, r = self.h, self.dt, self.point
-        p0, p1, p2 = _quadratic(self.speed, h)
-        q0, q1, q2 = _quadratic(self.turn, h)
+        p0, p1, p2, s3, s4 = _divided(self.speed, self.since, h)
+        q0, q1, q2, o3, o4 = _divided(self.turn, self.since, h)
         a, b, c, d = self.heading[:, None, :]
         t0, t1 = ((a * h + b) * h + c) * h + d, (3 * a * h + 2 * b) * h + c
         t2, t3 = 6 * a * h + 2 * b, np.abs(6 * a[0])
@@ -163,23 +192,23 @@ class Swing:
         v2 = p2 - 2j * t1 * p1 - (1j * t2 + t1**2) * p0
         v = np.exp(-1j * t0) * np.stack([v0, v1, v2])
         omega = np.stack([q0, q1, q2])
-        # The sizes: quadratics bend, their derivatives and θ'' are linear.
+        # The sizes: θ'' is linear in time, P'' in 1 / τ³; their ends bound them.
         bent = dt**2 / 8
-        s0 = np.abs(p0).max(axis=0) + bent * np.abs(p2[0])
-        s1, s2 = np.abs(p1).max(axis=0), np.abs(p2[0])
+        s2, o2 = np.abs(p2).max(axis=0), np.abs(q2).max(axis=0)
+        s1, o1 = np.abs(p1).max(axis=0) + bent * s3, np.abs(q1).max(axis=0) + bent * o3
+        s0 = np.abs(p0).max(axis=0) + bent * s2
         w1 = np.abs(t1).max(axis=0) + bent * t3
         w2 = np.abs(t2).max(axis=0)
         # |dᵏ/dtᵏ e^{-jθ}|, with θ⁗ = 0
         e2, e3 = w2 + w1**2, t3 + 3 * w1 * w2 + w1**3
         e4 = 3 * w2**2 + 4 * w1 * t3 + 6 * w1**2 * w2 + w1**4
-        zero = np.zeros_like(dt)
-        omega_most = np.stack([np.abs(q1).max(axis=0), np.abs(q2[0]), zero, zero])
+        omega_most = np.stack([o1, o2, o3, o4])
         v_most = np.stack(
             [
                 s1 + w1 * s0,
                 s2 + 2 * w1 * s1 + e2 * s0,
-                3 * w1 * s2 + 3 * e2 * s1 + e3 * s0,
-                6 * e2 * s2 + 4 * e3 * s1 + e4 * s0,
+                s3 + 3 * w1 * s2 + 3 * e2 * s1 + e3 * s0,
+                s4 + 4 * w1 * s3 + 6 * e2 * s2 + 4 * e3 * s1 + e4 * s0,
             ]
         )
         return Directions(
@@ -187,19 +216,39 @@ class Swing:
         )
 
 
-def _quadratic(
-    coefficients: npt.NDArray[Number], h: FloatArray
-) -> tuple[npt.NDArray[Number], npt.NDArray[Number], npt.NDArray[Number]]:
-    """Return value and two derivatives of quadratics at both ends, (2, m) each."""
-    a, b, c = coefficients[:, None, :]
-    two = np.broadcast_to(2 * a, h.shape)
-    return (a * h + b) * h + c, 2 * a * h + b, two
+def _divided(
+    coefficients: npt.NDArray[Number], since: FloatArray, h: FloatArray
+) -> tuple[
+    npt.NDArray[Number],
+    npt.NDArray[Number],
+    npt.NDArray[Number],
+    FloatArray,
+    FloatArray,
+]:
+    """Return value and two derivatives at both ends, (2, m) each, of what was divided.
+
+    And bounds on the sizes of the third and the fourth derivative, (m,).
+    """
+    a, b, c, left = coefficients[:, None, :]
+    tau = since + h
+    pole = left / tau
+    nearest, size = np.abs(tau).min(axis=0), np.abs(left[0])
+    return (
+        (a * h + b) * h + c + pole,
+        2 * a * h + b - pole / tau,
+        2 * a + 2 * pole / tau**2,
+        6 * size / nearest**4,
+        24 * size / nearest**5,
+    )
 
 
 def factored(
-    cubic: npt.NDArray[Number], span: FloatArray, rest: BoolArray | None
+    cubic: npt.NDArray[Number],
+    span: FloatArray,
+    rest: BoolArray | None,
+    since: FloatArray,
 ) -> npt.NDArray[Number]:
-    """Return the derivatives of cubic pieces without their roots at rest.
+    """Return the derivatives of cubic pieces divided by the time since rest.
 
     Parameters
     ----------
@@ -209,20 +258,29 @@ def factored(
         Length of the pieces.
     rest : (2, m) bool or None
         Whether they start and whether they end at rest, where the derivative is zero.
+    since : (m,) float, s
+        Of pieces that neither start nor end at rest: how long after a rest they start,
+        negative before it; infinite where they are to stay as they are.
 
     Returns
     -------
-    quadratic : (3, m)
-        Highest power first; the derivative is this times ``h``, ``h - span`` or both.
+    divided : (4, m)
+        As of `Swing.speed`; the derivative is this times ``h``, ``h - span``, both, τ
+        or 1.
     """
-    a, b, c, _ = cubic
-    whole = np.stack([3 * a, 2 * b, c])
+    a, b, c = 3 * cubic[0], 2 * cubic[1], cubic[2]
+    zero = np.zeros_like(a)
+    is_far = np.isinf(since)
+    past = np.where(is_far, 0.0, since)
+    # a h² + b h + c with h = τ - past
+    left = a * past**2 - b * past + c
+    whole = np.where(is_far, [a, b, c, zero], [zero, a, b - a * past, left])
     if rest is None:
         return whole
-    zero, (start, end) = np.zeros_like(a), rest
-    after = np.stack([zero, 3 * a, 2 * b])
-    before = np.stack([zero, 3 * a, 3 * a * span + 2 * b])
-    both = np.stack([zero, zero, 3 * a])
+    start, end = rest
+    after = np.stack([zero, a, b, zero])
+    before = np.stack([zero, a, a * span + b, zero])
+    both = np.stack([zero, zero, a, zero])
     return np.where(
         start & end, both, np.where(start, after, np.where(end, before, whole))
     )

@@ -19,7 +19,7 @@ from configspace.vehicle import (
     OmniWheel,
     SteerableWheel,
 )
-from omniplan.judging.beside import beside_axis, zone_bounds
+from omniplan.judging.beside import beside_axis, beside_gain, zone_bounds
 from omniplan.judging.body_rows import BodyRows
 from omniplan.judging.chords import (
     Change,
@@ -28,6 +28,7 @@ from omniplan.judging.chords import (
     changed,
     ends_moving,
     growth,
+    one_way,
     over,
     scaled,
     size,
@@ -90,7 +91,7 @@ class VehicleJudge:
         # One evaluation on an empty part lists the rows.
         empty = np.zeros(0)
         nothing = replace(
-            Enclosure(*([empty] * 15)),  # type: ignore[arg-type]
+            Enclosure(*([empty] * 17)),  # type: ignore[arg-type]
             swing=Swing.nothing(),
         )
         self.rows = tuple(row for row, _ in self._evaluate(nothing, 1))
@@ -136,7 +137,10 @@ class VehicleJudge:
             change = Change.of(part, self._vehicle.contacts[i])
             if isinstance(wheel, SteerableWheel):
                 entries += self._steered(i, wheel, part, chord, change, own, moving)
-                gain = growth(part, chord, change, 0)
+                gains = [growth(part, chord, change, 0)]
+                if self._has_swing and (any(wheel.offsets) or wheel.steering_coupling):
+                    stands = speed[1] <= floor
+                    gains = self._beside(i, wheel, part, own, moving, stands, gains[0])
             else:
                 if isinstance(wheel, FixedWheel) and not self._is_own:
                     entries.append(self._slip(i, wheel, chord, speed))
@@ -144,8 +148,8 @@ class VehicleJudge:
                 roller = 0.0 if isinstance(wheel, FixedWheel) else wheel.roller
                 turn = np.exp(-1j * (wheel.heading + roller)) / math.cos(roller)
                 chord, change = along(chord, turn), changed(part, change, turn)
-                gain = size(change)
-            entries += self._rolling(i, wheel, part, chord, gain)
+                gains = [size(change)]
+            entries += self._rolling(i, wheel, part, chord, gains)
         whole = BodyRows(self._vehicle, self._tolerances, self._is_own, self._has_rates)
         return [*entries, *whole.evaluate(part, body, own)]
 
@@ -176,7 +180,7 @@ class VehicleJudge:
             zone = zone_bounds(part, row, self.kappa_g, self.reference, chord, moving)
             entries.append((Row("SINGULAR_ZONE", i, 1.0, "1", "none", True), zone))
         if wheel.steering_range_deg is not None:
-            entries.append(_steering_range(i, wheel, chord, own, rolls))
+            entries.append(_steering_range(i, wheel, part, chord, change, own, rolls))
         rate = turning(part, chord, change, (rolls[0], rolls[1]))
         if wheel.max_steering_rate_deg is not None:
             limit = math.radians(wheel.max_steering_rate_deg)
@@ -191,6 +195,36 @@ class VehicleJudge:
             for bounds in beside:
                 entries.append((roll, bounds))
         return entries
+
+    def _beside(
+        self,
+        i: int,
+        wheel: SteerableWheel,
+        part: Enclosure,
+        own: FloatArray,
+        moving: tuple[FloatArray, FloatArray],
+        stands: BoolArray,
+        at_axis: Bounds,
+    ) -> list[Bounds]:
+        """Return the accelerations of wheels beside an axis, and of shared motors.
+
+        Where the vehicle stands the wheels are free to steer: there the axis counts.
+        """
+        point = self._vehicle.contacts[i]
+        chord = Chord.of(part, point)
+        first, last = (
+            (v > 0) & (np.abs(u) > 1e-9 * v)
+            for v, u in zip(moving, (chord.a, chord.b), strict=True)
+        )
+        found = []
+        for offset in wheel.offsets:
+            bounds = beside_gain(wheel, offset, part, point, own, (first, last))
+            low, high = (
+                np.where(stands, axis, moved)
+                for axis, moved in zip(at_axis, bounds, strict=True)
+            )
+            found.append((low, high))
+        return found
 
     def _swinging(
         self,
@@ -231,9 +265,9 @@ class VehicleJudge:
         wheel: SteerableWheel | FixedWheel | MecanumWheel | OmniWheel,
         part: Enclosure,
         chord: Chord,
-        gain: Bounds,
+        gains: list[Bounds],
     ) -> list[tuple[Row, Bounds]]:
-        """Return rolling speed and its change."""
+        """Return rolling speed and its change, of every wheel on an axis."""
         entries: list[tuple[Row, Bounds]] = []
         on_axis = not isinstance(wheel, SteerableWheel) or 0.0 in wheel.offsets
         if wheel.max_speed is not None and on_axis and not self._is_own:
@@ -242,14 +276,16 @@ class VehicleJudge:
         if wheel.max_acceleration is not None and self._has_rates:
             limit = wheel.max_acceleration
             row = Row("WHEEL_ACCELERATION", i, limit, "m/s²", "acceleration")
-            entries.append((row, over(gain, limit)))
+            entries += [(row, over(gain, limit)) for gain in gains]
         return entries
 
 
 def _steering_range(
     i: int,
     wheel: SteerableWheel,
+    part: Enclosure,
     chord: Chord,
+    change: Change,
     own: FloatArray,
     rolls: list[BoolArray],
 ) -> tuple[Row, Bounds]:
@@ -266,8 +302,10 @@ def _steering_range(
     start = wrap(np.angle(own * chord.a) - middle)
     end = start + np.angle(chord.b * chord.a.conj())
     at_end = wrap(np.angle(own * chord.b) - middle)
-    # The segment sweeps from start to end; its surroundings a little more.
-    high = np.maximum(np.abs(start), np.abs(end)) + chord.spread()
+    # The segment sweeps from start to end; its surroundings a little more, but not
+    # where the angle moves one way only: a wheel may leave its very stop.
+    spread = np.where(one_way(part, chord, change), 0.0, chord.spread())
+    high = np.maximum(np.abs(start), np.abs(end)) + spread
     if half == math.pi:
         high = np.maximum(high, _over_the_seam(start, at_end))
     low = np.maximum(

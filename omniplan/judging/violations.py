@@ -164,6 +164,7 @@ class _Describer:
 
 def find_violations(
     parts: Parts,
+    first: Parts,
     choice: Choice,
     judge: Judge,
     trajectory: Trajectory,
@@ -176,6 +177,8 @@ def find_violations(
     ----------
     parts : Parts
         Decided.
+    first : Parts
+        The intervals between the samples, as a whole.
     choice : Choice
     judge : Judge
     trajectory : Trajectory
@@ -189,6 +192,7 @@ def find_violations(
     if not faults.any():
         return
     at_end = _worse_at_end(judge, parts, sign)
+    at_samples = first.picked(choice.sign_of(first.spans))[0]
     for column, row in enumerate(judge.rows):
         for run in _runs(faults[:, column]):
             reached = low[run, column]
@@ -205,9 +209,22 @@ def find_violations(
             angle = None
             if column in parts.angles:
                 angle = float(parts.angles[column][int(at_end[part, column])][part])
-            yield describer.violation(
+            violation = describer.violation(
                 row, place, span, ratio, is_proved=is_proved, angle=angle
             )
+            if is_proved and angle is None and row.bound > 0:
+                touched = (first.spans.t0 < span[1]) & (first.spans.t1 > span[0])
+                most = float(at_samples[touched, column].max(initial=0.0))
+                violation = replace(violation, excess_at_samples=_excess(row, most))
+            yield violation
+
+
+def _excess(row: Row, ratio: float) -> float:
+    """Return how far a utilisation is beyond a limit, as `Violation.excess` has it."""
+    if row.limit in {"FIXED_WHEEL", "PARALLEL_WHEELS"} and row.unit == "1":
+        slip = math.asin(min(ratio * row.bound, 1.0))
+        return max(slip / math.asin(row.bound) - 1, 0.0)
+    return max(ratio - 1, 0.0)
 
 
 def reconfiguration_violations(

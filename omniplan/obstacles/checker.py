@@ -9,18 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from configspace import InvalidInput, Problem
+from configspace import Problem
 from omniplan.errors import InvalidTrajectory
 from omniplan.motion import PoseMotion, motion_of
+from omniplan.obstacles.asked import (
+    checked_bounds,
+    checked_clearance,
+    not_finite,
+    walls,
+)
 from omniplan.obstacles.broad import Broad
 from omniplan.obstacles.footprint import Body, Footprint, footprint_of
+from omniplan.obstacles.hit import Hit
 from omniplan.obstacles.obstacles import Obstacles
 from omniplan.obstacles.polygons import Geometries
 from omniplan.obstacles.sweep import (
@@ -35,10 +41,9 @@ from omniplan.obstacles.sweep import (
     hulls_between,
     swept_by,
 )
-from omniplan.samples import MAX_VALUE
 from omniplan.trajectory import Trajectory, timed
 
-__all__ = ["CollisionChecker", "Hit"]
+__all__ = ["CollisionChecker"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -48,47 +53,10 @@ TOUCH = 1e-9
 """What is nearer than the clearance and this touches, m: room for rounding."""
 UNDECIDED = 1e-4
 """A part of a motion in which no point moves farther is not cut any more, m."""
-_FAR = 4 * MAX_VALUE
 _CHUNK = 1024
 _QUARTERS = np.linspace(0, 1, 5)
 # Types of shapely know no array of distances.
 _dwithin: Any = shapely.dwithin
-
-
-@dataclass(frozen=True)
-class Hit:
-    """Where a vehicle hits something, or comes nearer than the clearance."""
-
-    obstacle: str
-    """Name; ``bounds`` for the border of the area."""
-    index: int
-    """Of the obstacle; -1 for the bounds."""
-    pose: Pose
-    """(x, y, θ) of the vehicle, m, m, rad."""
-    place: tuple[float, float]
-    """The place of the obstacle that is hit or nearest, m."""
-    distance: float
-    """Distance left, m; 0 for a hit."""
-    clearance: float
-    """The distance asked for, m."""
-    u: float = 0.0
-    """Share of the motion that is free before, 0 to 1."""
-    t: float | None = None
-    """Time on a trajectory, s."""
-
-    @property
-    def message(self) -> str:
-        """What is hit and where, in one line."""
-        x, y, theta = self.pose
-        at = f"at ({x:.3f} m, {y:.3f} m, {math.degrees(theta):.1f}°)"
-        when = "" if self.t is None else f" at t = {self.t:.3f} s"
-        where = f"{self.obstacle} near ({self.place[0]:.3f} m, {self.place[1]:.3f} m)"
-        if self.distance == 0.0:
-            return f"hits {where}: the vehicle stands {at}{when}"
-        return (
-            f"comes as near as {self.distance:.4f} m to {where}, "
-            f"clearance {self.clearance:g} m: the vehicle stands {at}{when}"
-        )
 
 
 class CollisionChecker:
@@ -133,17 +101,17 @@ class CollisionChecker:
         bounds: Sequence[float] | None = None,
     ) -> None:
         self.obstacles = Obstacles() if obstacles is None else obstacles
-        self.clearance = _checked_clearance(clearance)
-        self.bounds = None if bounds is None else _checked_bounds(bounds)
+        self.clearance = checked_clearance(clearance)
+        self.bounds = None if bounds is None else checked_bounds(bounds)
         self._in_file, self._k = footprint_of(body)
         self.footprint = self._in_file.moved(-self._k)
         """In the frame of K."""
         self._limit = self.clearance + TOUCH
         self._ball = self.footprint.radius + self._limit
         self._parts = self.footprint.parts
-        walls = _walls(self.bounds)
-        pieces = np.concatenate([self.obstacles.pieces, walls])
-        self._owner = np.concatenate([self.obstacles.owner, np.full(len(walls), -1)])
+        border = walls(self.bounds)
+        pieces = np.concatenate([self.obstacles.pieces, border])
+        self._owner = np.concatenate([self.obstacles.owner, np.full(len(border), -1)])
         self._broad = Broad(pieces, 3 * self._ball)
 
     def is_free(self, pose: Sequence[float] | FloatArray) -> bool:
@@ -156,7 +124,7 @@ class CollisionChecker:
         """
         x, y, theta = pose
         if not math.isfinite(x + y + theta):
-            raise _not_finite(pose)
+            raise not_finite(pose)
         nearby = self._broad.at(x, y)
         if nearby.gap > self._ball:
             return True
@@ -181,7 +149,7 @@ class CollisionChecker:
         """
         at = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(at).all():
-            raise _not_finite(at[~np.isfinite(at).all(axis=1)][0])
+            raise not_finite(at[~np.isfinite(at).all(axis=1)][0])
         return ~self._touching(self.footprint, at)
 
     def distance(self, pose: Sequence[float] | FloatArray) -> float:
@@ -191,7 +159,7 @@ class CollisionChecker:
         """
         x, y, theta = (float(value) for value in pose)
         if not math.isfinite(x + y + theta):
-            raise _not_finite(pose)
+            raise not_finite(pose)
         return self._nearest(self.footprint, (x, y, theta))[0]
 
     def hit_at(self, pose: Sequence[float] | FloatArray) -> Hit | None:
@@ -220,7 +188,7 @@ class CollisionChecker:
         x1, y1, theta1 = (float(value) for value in motion.goal)
         turn, length = float(motion.turn), float(motion.length)
         if not math.isfinite(x0 + y0 + theta0 + x1 + y1 + theta1 + turn + length):
-            raise _not_finite((x0, y0, theta0))
+            raise not_finite((x0, y0, theta0))
         # No point of K's way is farther from the middle than half its length.
         ball = length / 2 + self._ball
         if ball <= self._broad.reach:
@@ -486,43 +454,3 @@ class CollisionChecker:
 def _hulls(corners: npt.NDArray[np.complex128]) -> Geometries:
     xy = corners.view(np.float64).reshape(*corners.shape, 2)
     return np.asarray(shapely.convex_hull(shapely.linearrings(xy)))
-
-
-def _walls(bounds: tuple[float, float, float, float] | None) -> Geometries:
-    """Return what lies outside the bounds."""
-    if bounds is None:
-        return np.empty(0, dtype=np.object_)
-    x0, y0, x1, y1 = bounds
-    sides = [
-        (-_FAR, -_FAR, x0, _FAR),
-        (x1, -_FAR, _FAR, _FAR),
-        (-_FAR, -_FAR, _FAR, y0),
-        (-_FAR, y1, _FAR, _FAR),
-    ]
-    return np.asarray(shapely.box(*np.array(sides).T))
-
-
-def _checked_clearance(clearance: float) -> float:
-    if not (math.isfinite(clearance) and 0 <= clearance <= MAX_VALUE):
-        allowed = "a finite distance of at least 0 m"
-        raise InvalidInput(Problem("clearance", f"{clearance}", allowed))
-    return float(clearance)
-
-
-def _checked_bounds(given: Sequence[float]) -> tuple[float, float, float, float]:
-    allowed = f"[x0, y0, x1, y1] with x0 < x1 and y0 < y1, at most {MAX_VALUE:g} m"
-    try:
-        x0, y0, x1, y1 = (float(value) for value in given)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(Problem("bounds", repr(given)[:60], allowed)) from error
-    ordered = -MAX_VALUE <= x0 < x1 <= MAX_VALUE and -MAX_VALUE <= y0 < y1 <= MAX_VALUE
-    if not ordered:
-        raise InvalidInput(
-            Problem("bounds", f"[{x0:g}, {y0:g}, {x1:g}, {y1:g}]", allowed)
-        )
-    return x0, y0, x1, y1
-
-
-def _not_finite(pose: Sequence[float] | FloatArray) -> InvalidInput:
-    shown = ", ".join(f"{float(value):g}" for value in pose)
-    return InvalidInput(Problem("pose", f"({shown})", "finite numbers"))

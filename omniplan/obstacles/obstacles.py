@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPolygon, Polygon
 
 from configspace import InvalidInput, Problem
 from omniplan.obstacles.maps import read_map
@@ -30,6 +30,10 @@ __all__ = ["Obstacles"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+JOINED = 20_000
+"""Pieces of an obstacle that are joined for a drawing, at most."""
 
 
 def _no_pieces() -> Geometries:
@@ -222,12 +226,14 @@ class Obstacles:
     def rings(self) -> tuple[tuple[FloatArray, ...], ...]:
         """Return the closed rings (n, 2), m, of every obstacle, for drawing.
 
-        Outer rings run counter-clockwise, holes clockwise.
+        Outer rings run counter-clockwise, holes clockwise. The pieces of an obstacle
+        are joined unless there are more than `JOINED`.
         """
         ends = np.searchsorted(self.owner, np.arange(len(self.names) + 1))
+        owned = (self.pieces[a:b] for a, b in itertools.pairwise(ends.tolist()))
         return tuple(
-            rings_of(joined(self.pieces[a:b]))
-            for a, b in itertools.pairwise(ends.tolist())
+            rings_of(joined(own) if len(own) <= JOINED else MultiPolygon(own.tolist()))
+            for own in owned
         )
 
 

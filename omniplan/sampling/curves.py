@@ -11,11 +11,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from omniplan.planning.moves import Move
 
-__all__ = ["arcs_of"]
+__all__ = ["along_curves", "arcs_of"]
 
 Pose: TypeAlias = tuple[float, float, float]
 _Kind: TypeAlias = tuple[float, float]
@@ -129,3 +131,49 @@ def _is_same(a: list[float], b: Pose) -> bool:
         and abs(a[1] - b[1]) <= _SAME
         and abs(math.remainder(a[2] - b[2], 2 * math.pi)) <= _SAME
     )
+
+
+def along_curves(
+    state_space: Any, checker: Any, radius: float
+) -> Callable[[Any, Any], bool]:
+    """Return the check of curves for collisions and bounds, segment by segment.
+
+    Parameters
+    ----------
+    state_space : OMPL state space
+        Dubins' or Reeds and Shepp's.
+    checker : Collisions
+    radius : float, m
+        Of the curves.
+    """
+
+    def check(first: Any, second: Any) -> bool:
+        between = state_space.allocState()
+
+        def pose_at(share: float) -> Pose:
+            state_space.interpolate(first, second, share, between)
+            return between.getX(), between.getY(), between.getYaw()
+
+        length = state_space.distance(first, second)
+        moves = arcs_of(pose_at, length, radius)
+        return all(checker.is_motion_free(move) for move in moves) and all(
+            _is_within(state_space, move) for move in moves
+        )
+
+    return check
+
+
+def _is_within(state_space: Any, move: Move) -> bool:
+    """Return whether K stays within the bounds of a state space on a move."""
+    bounds = state_space.getBounds()
+    low, high = bounds.low, bounds.high
+    u = [0.0, 1.0]
+    if move.turn:
+        # The way is farthest out where it runs along an axis.
+        course = move.start[2] + move.beta_0
+        quarters = np.arange(-4, 5) * (np.pi / 2)
+        first = np.round(course / (np.pi / 2)) * (np.pi / 2)
+        shares = (first + quarters - course) / move.turn
+        u += shares[(shares > 0) & (shares < 1)].tolist()
+    places = move.poses(np.array(u))[:, :2]
+    return bool((places >= low).all() and (places <= high).all())

@@ -5,14 +5,10 @@ What of OMPL 2.0.1's Python bindings this relies on is kept by
 `checkMotion` with two states of Python classes. It never asks Python for the last valid
 state of a motion (`checkMotion` with three arguments is answered by the one with two,
 and "nothing of it" stays as the share): see `MotionValidator.last_valid`.
-
-States are read by `StateSpace.serialize`, which writes all numbers of a state at once;
-that is quicker than asking for them one by one.
 """
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -24,12 +20,13 @@ from ompl import base, control, geometric, util
 
 from configspace import PermissibleSpace
 from configspace.errors import InvalidInput, Problem
+from configspace.omni_curve import finite
 from configspace.space import require_space
 from omniplan.planning.moves import Move
-from omniplan.sampling.curves import arcs_of
+from omniplan.sampling.curves import along_curves
 from omniplan.sampling.intervals import PermittedIntervals
-from omniplan.sampling.kernels import is_move_permitted
 from omniplan.sampling.line_radius import is_radius_permitted, least_radius
+from omniplan.sampling.lines import lines_permitted
 
 __all__ = [
     "Collisions",
@@ -52,9 +49,6 @@ FloatArray = npt.NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 Check = Callable[[Any, Any], bool]
-
-_NUMBERS = 3 * ctypes.sizeof(ctypes.c_double)
-"""Bytes of a serialized state of SE(2): x, y and the heading."""
 
 
 class Collisions(Protocol):
@@ -224,14 +218,12 @@ def motion_validator(
     if not _is_plain(state_space):
         radius = _radius_of(state_space)
         _require_radius(intervals, radius)
-        checks = (
-            [] if checker is None else [_along_curves(state_space, checker, radius)]
-        )
+        checks = [] if checker is None else [along_curves(state_space, checker, radius)]
         method = _all_of([*checks, *stepwise])
     else:
         along = [] if checker is None else [_along_lines(checker)]
         others = _all_of([*along, *stepwise]) if along or stepwise else None
-        method = _lines_permitted(state_space, intervals.table, others)
+        method = lines_permitted(state_space, intervals.table, others)
     made: MotionValidator = _with_method(MotionValidator, "checkMotion", method)(
         si, space
     )
@@ -329,10 +321,11 @@ def bounds_of(bounds: tuple[float, float, float, float]) -> Any:
     InvalidInput
         Unless the numbers are finite and least ones are less than largest ones.
     """
-    x_min, y_min, x_max, y_max = (float(each) for each in bounds)
-    if not (np.isfinite(bounds).all() and x_min < x_max and y_min < y_max):
+    numbers = finite("bounds", bounds, "m")
+    if numbers.shape != (4,) or not (numbers[:2] < numbers[2:]).all():
         allowed = "(x_min, y_min, x_max, y_max) in m, least below largest"
         raise InvalidInput(Problem("bounds", f"{bounds}", allowed))
+    x_min, y_min, x_max, y_max = numbers.tolist()
     out = base.RealVectorBounds(2)
     for axis, low, high in ((0, x_min, x_max), (1, y_min, y_max)):
         out.setLow(axis, low)
@@ -413,52 +406,6 @@ def _all_of(checks: Sequence[Check]) -> Callable[[Any, Any, Any], bool]:
     return lambda _, first, second: all(check(first, second) for check in checks)
 
 
-def _lines_permitted(
-    state_space: Any,
-    table: FloatArray,
-    others: Callable[[Any, Any, Any], bool] | None,
-) -> Callable[[Any, Any, Any], bool]:
-    """Return the method that holds straight motions against the vehicle's table.
-
-    The kernel reads both poses from the first numbers of a copy of the table. A copy is
-    taken from the stock for every call and given back: threads do not meet in it.
-    """
-    write = state_space.serialize
-    judge = is_move_permitted
-
-    def made() -> tuple[Any, Any, FloatArray]:
-        own = table.copy()
-        address = own.ctypes.data
-        return _capsule(address), _capsule(address + _NUMBERS), own
-
-    stock = [made()]
-    take, give = stock.pop, stock.append
-
-    def check_motion(validator: Any, first: Any, second: Any) -> bool:
-        try:
-            place = take()
-        except IndexError:  # all are in use by other threads
-            place = made()
-        at_first, at_second, own = place
-        write(at_first, first)
-        write(at_second, second)
-        answer: bool = judge(own)
-        give(place)
-        if answer and others is not None:
-            return others(validator, first, second)
-        return answer
-
-    return check_motion
-
-
-def _capsule(address: int) -> Any:
-    """Return a C pointer as nanobind takes it for ``void *``."""
-    make = ctypes.pythonapi.PyCapsule_New
-    make.restype = ctypes.py_object
-    make.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
-    return make(address, b"nb_handle", None)
-
-
 def _pose(state: Any) -> Pose:
     return state.getX(), state.getY(), state.getYaw()
 
@@ -470,41 +417,6 @@ def _along_lines(checker: Collisions) -> Check:
         return bool(checker.is_motion_free(Move.straight(_pose(first), _pose(second))))
 
     return check
-
-
-def _along_curves(state_space: Any, checker: Collisions, radius: float) -> Check:
-    """Return the check of curves for collisions and bounds, segment by segment."""
-
-    def check(first: Any, second: Any) -> bool:
-        between = state_space.allocState()
-
-        def pose_at(share: float) -> Pose:
-            state_space.interpolate(first, second, share, between)
-            return _pose(between)
-
-        length = state_space.distance(first, second)
-        moves = arcs_of(pose_at, length, radius)
-        return all(checker.is_motion_free(move) for move in moves) and all(
-            _is_within(state_space, move) for move in moves
-        )
-
-    return check
-
-
-def _is_within(state_space: Any, move: Move) -> bool:
-    """Return whether K stays within the bounds of a state space on a move."""
-    bounds = state_space.getBounds()
-    low, high = bounds.low, bounds.high
-    u = [0.0, 1.0]
-    if move.turn:
-        # The way is farthest out where it runs along an axis.
-        course = move.start[2] + move.beta_0
-        quarters = np.arange(-4, 5) * (np.pi / 2)
-        first = np.round(course / (np.pi / 2)) * (np.pi / 2)
-        shares = (first + quarters - course) / move.turn
-        u += shares[(shares > 0) & (shares < 1)].tolist()
-    places = move.poses(np.array(u))[:, :2]
-    return bool((places >= low).all() and (places <= high).all())
 
 
 def _radius_of(state_space: Any) -> float:

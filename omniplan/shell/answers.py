@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
 
     from omniplan.choosing.fitness import Suitability
@@ -27,6 +29,7 @@ __all__ = [
     "print_json",
     "progress_console",
     "say",
+    "say_written",
 ]
 
 YES, NO, BAD_INPUT, FAILURE = 0, 1, 2, 3
@@ -47,7 +50,8 @@ def answer_timed(
             if timing is not None:
                 print(f"timed: {timing.message}")
             if report is not None:
-                print("\n".join(report_lines(report)))
+                is_timed = timing is not None
+                print("\n".join(report_lines(report, is_timed=is_timed)))
         data = {"valid": False} if report is None else report.to_dict()
         found.append(data if timing is None else {**data, "timing": timing.to_dict()})
     if as_json:
@@ -108,6 +112,14 @@ def progress_console() -> Console:
 def say(text: str, as_json: bool) -> None:
     """Print a remark where it does not disturb JSON."""
     print(text, file=sys.stderr if as_json else sys.stdout)
+
+
+def say_written(path: Path, as_json: bool) -> None:
+    """Print which file was written."""
+    if as_json:
+        print_json({"output": str(path)})
+    else:
+        print(f"wrote {path}")
 
 
 def print_json(data: object) -> None:

@@ -26,8 +26,13 @@ __all__ = [
 
 
 def space_of(name: str) -> PermissibleSpace:
-    """Return the space of a catalogue name, a vehicle file or a data sheet."""
+    """Return the space of a catalogue name, a vehicle file or a data sheet.
+
+    A data sheet that cannot be read is the user's mistake; a damaged entry of the cache
+    is none: it is computed anew, with a line in the log.
+    """
     from configspace import (
+        CacheError,
         InvalidInput,
         Problem,
         build_space,
@@ -39,7 +44,11 @@ def space_of(name: str) -> PermissibleSpace:
         allowed = "a vehicle is needed here; trajectories stand before --fleet"
         raise InvalidInput(Problem("vehicle", name, allowed))
     if name.endswith(".safetensors"):
-        return load_space(name)
+        try:
+            return load_space(name)
+        except CacheError as error:
+            given, allowed = f"{error}", "a sound data sheet of this version"
+            raise InvalidInput(Problem("vehicle", given, allowed)) from error
     return build_space(load_vehicle(name))
 
 

@@ -81,6 +81,7 @@ class Changer:
         rest : float, s
             Time there is.
         """
+        start, goal = self._on_line(start), self._on_line(goal)
         wheel, turn = self._turn(start, goal)
         if abs(turn) <= self._tolerances.alignment:
             stay = Way(0.0, tuple(self._aligned(start, goal)))
@@ -92,6 +93,16 @@ class Changer:
         if not self._judge.winding_wheels:
             ways = [min(ways, key=lambda way: way.time)]
         return Change(start, goal, wheel, turn, tuple(ways))
+
+    def _on_line(self, at: Configuration) -> Configuration:
+        """Return what a line-mobile vehicle does of it: it slips, but its β stays."""
+        line = self._space.line_beta
+        if line is None:
+            return at
+        for beta in (line, float(wrap(line + math.pi))):
+            if abs(float(wrap(at[1] - beta))) <= self._tolerances.slip_angle:
+                return at[0], beta
+        return at
 
     def _searched(
         self, start: Configuration, goal: Configuration, known: float, rest: float

@@ -144,6 +144,12 @@ def time_paths(
     jobs = [(k, sign) for k in range(len(problem.pieces)) for sign in signs]
     profiles = problem.solve(*zip(*jobs, strict=True))
     by_job = dict(zip(jobs, profiles, strict=True))
+    finer = problem.refined(
+        [[by_job[k, sign] for sign in signs] for k in range(len(problem.pieces))]
+    )
+    if finer is not problem:
+        problem, profiles = finer, finer.solve(*zip(*jobs, strict=True))
+        by_job = dict(zip(jobs, profiles, strict=True))
     starts = np.cumsum([0, *(len(some) for some in pieces)]).tolist()
     return tuple(
         timer.time(route, problem, range(*span), by_job)

@@ -47,7 +47,7 @@ _SIZE_RATE = int(RowKind.SIZE_RATE)
 _SIZE_UP, _SIZE_DOWN = int(RowKind.SIZE_UP), int(RowKind.SIZE_DOWN)
 _COMPONENT_RATE = int(RowKind.COMPONENT_RATE)
 _ALONG, _STEER_ACC = int(RowKind.ACCELERATION_ALONG), int(RowKind.STEER_ACCELERATION)
-_SAMPLING = int(RowKind.SAMPLING)
+_SAMPLING, _BESIDE_RATE = int(RowKind.SAMPLING), int(RowKind.BESIDE_RATE)
 _FAST = {"nnan", "nsz", "reassoc", "contract"}
 """Reductions in any order; infinite values are meant, NaN never comes up."""
 
@@ -157,8 +157,15 @@ def evaluate_rows(
         else:
             ex, ey = v2.real - t3 * wy, v2.imag + t3 * wx
             bend = ey * gx - ex * gy
-            a[j, end, r] = alpha1 * scale
-            b[j, end, r] = (bend - 2 * alpha1 * along) * inverse * scale
+            alpha2 = (bend - 2 * alpha1 * along) * inverse
+            if kind == _STEER_ACC:
+                a[j, end, r] = alpha1 * scale
+                b[j, end, r] = alpha2 * scale
+                continue
+            size, lever, share = math.sqrt(square), sigma * levers[r], couplings[r]
+            a[j, end, r] = (size - (t1 + alpha1) * lever + alpha1 * share) * scale
+            rise = along / size - (t2 + alpha2) * lever + alpha2 * share
+            b[j, end, r] = rise * scale
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)

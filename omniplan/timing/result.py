@@ -70,7 +70,9 @@ class Timing:
     """The fastest permitted timing of one path for one vehicle, or why there is none.
 
     The profile is the optimum itself; the trajectory is its proved realisation and a
-    little slower.
+    little slower. Where steering accelerations count, the path's jumps of the third
+    derivative are rounded off on the way (`omniplan.timing.rounding`), so that it may
+    also be a little faster.
     """
 
     vehicle: str

@@ -8,6 +8,7 @@ and linear in ``x = u̇²`` and ``ü``:
 a speed                     ``load(u) x ≤ 1``, load = (speed per u̇ / limit)²
 a change of a speed r u̇     ``(r ü + r' x) / limit ≤ 1``, and ≥ -1 where two-sided
 a steering acceleration     ``α̈ = α' ü + α'' x``
+... beside an axis          ``dû/dt = r ü + r' x``, r = |g| - σ (θ' + α') D
 an acceleration along n     ``Re(g n̄) ü + Re((g' + j θ' g) n̄) x``
 ==========================  =====================================================
 
@@ -82,6 +83,8 @@ class RowKind(enum.IntEnum):
     """``α' ü + α'' x``, both signs"""
     SAMPLING = 22
     """``ü``, both signs: how fast u̇ may change for the samples to follow"""
+    BESIDE_RATE = 23
+    """``r ü + r' x``, both signs, with ``r = |g| - σ (θ' + α') D + k α'``"""
 
 
 FIRST_RATE = int(RowKind.SIZE_RATE)
@@ -109,7 +112,7 @@ class TimingRow:
     lever: float = 0.0
     """D, m: how far left of its axis a wheel rolls."""
     coupling: float = 0.0
-    """k, m: the share of motors that drive and steer."""
+    """k, m: the share of motors that drive and steer; of BESIDE_RATE with a sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,9 +246,29 @@ def _steered(contact: complex, i: int, wheel: SteerableWheel) -> Iterator[Timing
                 coupling=coupling,
             )
     if wheel.max_acceleration is not None:
-        bound = wheel.max_acceleration
-        yield TimingRow("WHEEL_ACCELERATION", i, RowKind.SIZE_RATE, bound, contact)
+        yield from _speeding_up(contact, i, wheel, wheel.max_acceleration)
     if wheel.max_steering_acceleration_deg is not None:
         bound = math.radians(wheel.max_steering_acceleration_deg)
         kind = RowKind.STEER_ACCELERATION
         yield TimingRow("STEER_ACCELERATION", i, kind, bound, contact)
+
+
+def _speeding_up(
+    contact: complex, i: int, wheel: SteerableWheel, bound: float
+) -> Iterator[TimingRow]:
+    """Yield the rows of ``|dû/dt| + k |α̈|`` of every wheel on an axis."""
+    limit, coupling = "WHEEL_ACCELERATION", wheel.steering_coupling
+    for offset in wheel.offsets:
+        if not (offset or coupling):
+            yield TimingRow(limit, i, RowKind.SIZE_RATE, bound, contact)
+            continue
+        for share in (coupling, -coupling) if coupling else (0.0,):
+            yield TimingRow(
+                limit,
+                i,
+                RowKind.BESIDE_RATE,
+                bound,
+                contact,
+                lever=offset,
+                coupling=share,
+            )

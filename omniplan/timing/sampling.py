@@ -8,8 +8,10 @@ gives it back. At both ends u(t) is continued as an even function: the motion st
 with full acceleration and takes no longer.
 
 A steering acceleration also depends on the third derivatives of the pose. Those of a
-spline through samples are right only where the true ones change slowly or at a sample:
-steps in which they change much get more samples, and so does every knot of the path.
+spline through samples are right only where the true ones change slowly: the path's own
+jumps are rounded off (see `rounding`), and steps in which they change much get more
+samples. Next to rest they are off by a share of the time since then: there samples
+follow each other in shares of it.
 
 Where limits change within a few samples the means may break them. There the limits are
 tightened and the piece is timed again, a few times over.
@@ -23,12 +25,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from omniplan.timing.path_motion import PathPiece
 from omniplan.timing.solver import PieceProfile, TimingProblem
 
 __all__ = ["SampledPiece", "sample_piece"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 RAMP = 2
 """Steps in which u̇ may come up from rest where nothing else bounds ü."""
@@ -44,18 +48,24 @@ EXACT = 0.01
 """Share of a limit on the steering acceleration by which samples may miss it ..."""
 MOST = 48
 """... unless a step needs more samples than this."""
-NEAR_REST = 2
-"""At most so many samples in the first and in the last step."""
-AT_KNOT = 4
-"""Least number of samples in a step with a knot of the path, and next to it."""
-BESIDE = 0.1
-"""So near the end of a step, in samples, a knot needs none of its own."""
+SINCE_REST = 0.05
+"""Share of the time since rest, or until it, that a sample may take ..."""
+BLUR = 1e-14
+"""... but not less time than lets rounding, of third derivatives so much over the cube
+of a sample's time per metre from the origin, be a share `BLURRED` of the limit."""
+BLURRED = 0.02
+WINDOW = 6.0
+"""Steps before and after a knot of the path over which its jump is rounded off."""
+IN_WINDOW = 4
+"""Least number of samples in a step there."""
 WORTH = 5e-4
 """Twice as many steps must gain more than this share of time."""
 STILL = 1e-8
 """``length / steps²`` at least, m: shorter steps would count as standing."""
 SHORTEST = 1e-5
 """Least step, s."""
+SLOWEST = 1e-3
+"""Paces and pulls count as this at least, m/s and m/s², or a share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +76,8 @@ class SampledPiece:
     """(n,) s, from the start of the piece."""
     u: FloatArray
     """(n,) m, from the start of the path."""
+    path: PathPiece
+    """What was sampled: the piece, or the same with rounded jumps."""
     excess: float
     """By how much time had to be stretched for all limits to hold; ≤ 1: they do."""
 
@@ -121,15 +133,24 @@ def _fitted(
     tight: FloatArray,
 ) -> SampledPiece:
     """Return the best samples that tightening the limits leads to."""
-    ramp = RAMP * profile.duration / count
-    max_change = float(np.sqrt(profile.x.max())) / ramp
+    sigma, dt = profile.sigma, profile.duration / count
+    max_change = float(np.sqrt(profile.x.max())) / (RAMP * dt)
+    reach = np.zeros(0)
+    if problem.bounds_steering_acceleration:
+        knots = problem.pieces[piece].u[1:-1]
+        pace = np.sqrt(np.interp(knots, profile.u, profile.x))
+        reach = WINDOW * dt * np.maximum(pace, SLOWEST * pace.max(initial=0.0))
+        problem, piece = problem.rounded(piece, reach), 0
+        (first,) = problem.solve([0], [sigma], max_change=[max_change])
+        problem = problem.refined([[first]])
+        tight = np.interp(problem.nodes(0), profile.u, tight)
     tight = tight * (1 + MARGIN)
     best: SampledPiece | None = None
     for _ in range(ROUNDS):
         (found,) = problem.solve(
-            [piece], [profile.sigma], max_change=[max_change], tight=[tight]
+            [piece], [sigma], max_change=[max_change], tight=[tight]
         )
-        sampled, place, factor = _smooth(problem, piece, found, count)
+        sampled, place, factor = _smooth(problem, piece, found, count, reach)
         if best is None or _price(sampled) < _price(best):
             best = sampled
         if sampled.excess <= 1:
@@ -149,8 +170,12 @@ def _smooth(
     piece: int,
     profile: PieceProfile,
     count: int,
+    reach: FloatArray,
 ) -> tuple[SampledPiece, FloatArray, FloatArray]:
-    """Return samples, and where between them time is too short by which factor."""
+    """Return samples, and where between them time is too short by which factor.
+
+    `reach` tells how far about its inner knots the path was rounded off.
+    """
     t = np.linspace(0.0, profile.duration, count + 1)
     dt = float(t[1])
     c = _u_at(profile, t)
@@ -168,39 +193,42 @@ def _smooth(
     speed = (rise[1:] + rise[:-1]) / 2
     between = (rise[:-2] + 6 * rise[1:-1] + rise[2:]) / 8
     middle = (c[:-3] + 23 * c[1:-2] + 23 * c[2:-1] + c[3:]) / 48
-    places = [u, middle]
-    speeds, changes = [speed, between], [change, (change[1:] + change[:-1]) / 2]
-    knots = problem.pieces[piece].u
-    at = np.empty(0)
-    if problem.bounds_steering_acceleration:  # it jumps at a knot: both sides count
-        at = _at_knots(c, u, knots)
-        k = np.minimum(at.astype(np.int64), count - 1)
-        h = at - k
-        slow = (1 - h) ** 2 * rise[k] + (1 + 2 * h * (1 - h)) * rise[k + 1]
-        slow = (slow + h**2 * rise[k + 2]) / 2
-        bent = (1 - h) * change[k] + h * change[k + 1]
-        near = np.array([np.nextafter(knots[1:-1], first), knots[1:-1]]).ravel()
-        places, speeds = [*places, near], [*speeds, slow, slow]
-        changes = [*changes, bent, bent]
-    place = np.concatenate(places)
+    place = np.concatenate([u, middle])
     factor = problem.slowdowns(
         piece,
         profile.sigma,
         place,
-        np.concatenate(speeds),
-        np.concatenate(changes),
+        np.concatenate([speed, between]),
+        np.concatenate([change, (change[1:] + change[:-1]) / 2]),
     )
     # Something must be left for the proof between the samples.
     factor = factor * (1 + MARGIN / 2)
+    given = problem.pieces[piece]
     if problem.bounds_steering_acceleration:
-        turn = problem.steering_gain(piece, profile.sigma, u)
+        turn, lever = problem.steering_gain(piece, u)
         samples = _samples_per_step(c, dt, turn)
-        # The way from rest must not look like standing still; next to rest samples
-        # miss a share that does not depend on how many they are.
-        ends = max(min(_most_steps(problem, piece, profile) // count, NEAR_REST), 1)
-        samples[[0, -1]] = np.minimum(samples[[0, -1]], ends)
-        t, u = _finer(t, c, knots, at, samples)
-    return SampledPiece(t, u, float(factor.max())), place, factor
+        samples[_is_rounded(given, u, reach)] *= IN_WINDOW
+        far = float(np.abs(given.poses_at(u)).max()) * BLUR / BLURRED
+        blur = far * lever
+        # A third derivative is blurred by `blur / h³` per u̇.
+        pace = np.maximum(np.minimum(speed[1:], speed[:-1]), dt * SLOWEST)
+        least = np.cbrt(np.maximum(blur[1:], blur[:-1]) / pace)
+        most = np.clip(dt / least, 1, MOST).astype(np.int64)
+        s = _spaced(np.minimum(samples, most))
+        s = _from_rest(s, dt, float(change[0]), float(blur[0]))
+        pull, over = float(-change[-1]), float(blur[-1])
+        s = count - _from_rest((count - s)[::-1], dt, pull, over)[::-1]
+        t, u = s * dt, _spline_at(c, s)
+        u[[0, -1]] = first, last
+    return SampledPiece(t, u, given, float(factor.max())), place, factor
+
+
+def _is_rounded(piece: PathPiece, u: FloatArray, reach: FloatArray) -> BoolArray:
+    """Return which of the steps between u, (n,), lie where the path was rounded off."""
+    stairs = np.diff(piece.u) < 2 * reach.max(initial=0.0)
+    k = np.clip(np.searchsorted(piece.u, u, side="right") - 1, 0, stairs.size - 1)
+    is_within = stairs[k] & (reach.size > 0)
+    return np.asarray(is_within[1:] | is_within[:-1], dtype=bool)
 
 
 def _samples_per_step(c: FloatArray, dt: float, turn: FloatArray) -> IntArray:
@@ -226,40 +254,40 @@ def _samples_per_step(c: FloatArray, dt: float, turn: FloatArray) -> IntArray:
     return np.clip(np.ceil(off / EXACT), 1, MOST).astype(np.int64)
 
 
-def _finer(
-    t: FloatArray,
-    c: FloatArray,
-    knots: FloatArray,
-    at: FloatArray,
-    samples: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return more samples of a B-spline, one of them at every knot of the path.
+def _spaced(samples: IntArray) -> FloatArray:
+    """Return sample times, counted in steps, from how many a step has."""
+    step = np.repeat(np.arange(samples.size), samples)
+    first = np.cumsum(samples) - samples
+    since = (np.arange(step.size) - first[step]) / samples[step]
+    return np.append(step + since, float(samples.size))
+
+
+def _from_rest(s: FloatArray, dt: float, pull: float, blur: float) -> FloatArray:
+    """Return sample times with finer ones after the start, counted in steps.
 
     Parameters
     ----------
-    t : (n,) s, uniform
-    c : (n + 2,) m, its control points
-    knots : (k,) m
-    at : (k - 2,) steps, where the inner knots are
-    samples : (n - 1,) least number of them per step
+    s : (n,) float
+        From 0 on.
+    dt : float, s
+    pull : float, m/s²
+        ü at the start.
+    blur : float, m s²
+        Over u̇ and the cube of a sample's time: how much rounding counts.
     """
-    steps = t.size - 1
-    for exact in at:
-        near = slice(max(int(exact) - 1, 1), min(int(exact) + 2, steps - 1))
-        samples[near] = np.maximum(samples[near], AT_KNOT)
-    step = np.repeat(np.arange(steps), samples)
-    first = np.cumsum(samples) - samples
-    s = np.append(step + (np.arange(step.size) - first[step]) / samples[step], steps)
-    for exact in at:
-        # The ends of steps stay: there the third derivative of u jumps.
-        k = min(int(exact), steps - 1)
-        place = (exact - k) * samples[k]
-        near = min(max(round(place), 1), int(samples[k]) - 1)
-        if near > 0 and min(place, samples[k] - place) > BESIDE:
-            s[first[k] + near] = exact
-    u = _spline_at(c, s)
-    u[[0, -1]] = knots[[0, -1]]
-    return s * float(t[1]), u
+    pull = max(pull, SLOWEST)
+    first = max((blur / pull) ** 0.25, math.sqrt(2 * STILL / pull))
+    added = [0.0]
+    while added[-1] < s[-1] / 3:
+        t = max(added[-1] * dt, first)
+        step = max(SINCE_REST * t, (blur / (pull * t)) ** (1 / 3)) / dt
+        if len(added) == 1:
+            step = first / dt
+        k = int(np.searchsorted(s, added[-1] + step * 0.5))
+        if s[k] - added[-1] <= step * 1.5 and s[k + 1] - s[k] <= step:
+            return np.concatenate([added, s[k:]])
+        added.append(added[-1] + step)
+    return s
 
 
 def _spline_at(c: FloatArray, s: FloatArray) -> FloatArray:
@@ -275,19 +303,6 @@ def _spline_at(c: FloatArray, s: FloatArray) -> FloatArray:
         )
         / 6
     )
-
-
-def _at_knots(c: FloatArray, u: FloatArray, knots: FloatArray) -> FloatArray:
-    """Return where the B-spline, which grows, takes its inner knots; by halving."""
-    inner = knots[1:-1]
-    k = np.searchsorted(u, inner, side="right") - 1
-    low = np.clip(k, 0, u.size - 2).astype(np.float64)
-    high = low + 1
-    for _ in range(50):
-        middle = (low + high) / 2
-        is_before = _spline_at(c, middle) < inner
-        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    return np.asarray((low + high) / 2)
 
 
 def _u_at(profile: PieceProfile, t: FloatArray) -> FloatArray:

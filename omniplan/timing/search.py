@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -14,15 +15,18 @@ from omniplan.choosing.faults import Fault
 from omniplan.judging.judge import judge_for
 from omniplan.judging.rows import Tolerances
 from omniplan.path import Path
+from omniplan.proving import Proved, prove
 from omniplan.report import Report
 from omniplan.standing.ways import Changer
+from omniplan.timing.caps import cap_use
 from omniplan.timing.path_motion import PathMotion, PathPiece
 from omniplan.timing.result import SpeedProfile, Timing, TimingStatus
 from omniplan.timing.sampling import sample_piece
 from omniplan.timing.shape import PieceShape, first_fault, shape_of
 from omniplan.timing.solver import PieceProfile, TimingProblem
+from omniplan.timing.tightening import any_is_tight, slowdowns_of, tightened
 from omniplan.trajectory import Trajectory
-from omniplan.validation import validate
+from omniplan.validation import report_of, validate
 from omniplan.wording import describe
 
 __all__ = ["Timer"]
@@ -34,17 +38,19 @@ PER_POSE = 2
 """Least number of samples between two poses of the path."""
 DWELL = 1e-4
 """Time at every stop, s, so that its pose is repeated and the stop cannot be missed."""
-LOSS = 4e-3
+LOSS = 5e-3
 """If a trajectory takes longer than the optimum by more than this share ..."""
-REFINEMENTS = (1, 1, 1, 1, 2, 4)
-"""... it is timed again, slower where `validate` found a limit broken, and sampled more
-finely, so many times."""
+REFINEMENTS = (1, 1, 1, 1, 1, 1, 2, 2)
+"""... it is timed again, slower where a limit was found broken, and sampled more
+finely, so many times ..."""
+PATIENCE = 3
+"""... unless it got no faster so often in a row."""
 AROUND = 3
-"""So many steps before and after such a place are passed more slowly, too ..."""
-SPARE = 1e-3
-"""... and by this share more than was asked for."""
-MOST_PROVED, MOST_UNDECIDED = 1.25, 1.1
-"""... but at most so many times more slowly at once."""
+"""So many steps before and after such a place are passed more slowly, too."""
+PARTS = 20_000
+"""How many parts a trajectory may be halved into until it is known well enough."""
+CANDIDATES = 2
+"""How many of the trajectories are proved until one is."""
 WAITS = 3
 """How often waits at stops are made longer as `validate` demands."""
 SHAPE_LIMITS = (
@@ -65,11 +71,37 @@ BLOCKED, NO_WAY = TimingStatus.BLOCKED, TimingStatus.NO_WAY
 class _Leg:
     """The samples of one piece."""
 
-    piece: int
+    piece: PathPiece
     t: FloatArray
     """(n,) s, from the start of the path."""
     u: FloatArray
     """(n,) m, from the start of the path."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Try:
+    """A trajectory as it was judged."""
+
+    proved: Proved
+    report: Report
+    """Its speed factor is what the margins promise."""
+
+    @cached_property
+    def estimate(self) -> float:
+        """How long it takes, if need be slowed down as a whole, s."""
+        if self.report.valid:
+            return self.report.duration
+        if not self.is_mendable:
+            return math.inf
+        return self.report.duration * max(float(slowdowns_of(self.proved).max()), 1.0)
+
+    @property
+    def is_mendable(self) -> bool:
+        """Whether driving some places more slowly may help."""
+        return all(
+            v.limit not in SHAPE_LIMITS and v.limit != "RECONFIGURATION"
+            for v in self.report.violations
+        )
 
 
 class Timer:
@@ -124,21 +156,23 @@ class Timer:
         chosen, waits = choice
         profile = _joined(problem, chosen, waits, self._wheel_ids)
         tight = [np.ones(one.u.size) for one in chosen]
-        best: Timing | None = None
+        tries: list[_Try] = []
         for finer in REFINEMENTS:
             legs = self._legs(problem, numbers, chosen, waits, tight, finer)
-            trajectory = _trajectory(path, problem, legs)
-            timing, report = self._proved(path, trajectory, profile)
-            if best is None or _worth(timing) < _worth(best):
-                best = timing
-            lost = _worth(best) / profile.duration - 1
-            if lost < LOSS or timing.status in (BLOCKED, NO_WAY):
+            one = self._tried(_trajectory(path, legs))
+            tries.append(one)
+            if _is_enough(tries, profile.duration):
                 break
-            if report.speed_factor > 1 - SPARE:  # nothing is left to mend
+            if not one.is_mendable or (one.report.valid and not any_is_tight(tight)):
                 break
-            _tighten(tight, legs, chosen, report, self._steps)
-        assert best is not None
-        return best
+            self._tighten(tight, legs, chosen, one.proved)
+        tries.sort(key=lambda one: one.estimate)
+        timing = self._proved(path, tries[0], profile)
+        for one in tries[1:CANDIDATES]:
+            if timing.duration is not None and timing.duration <= one.estimate:
+                break
+            timing = min(timing, self._proved(path, one, profile), key=_worth)
+        return timing
 
     @property
     def _wheel_ids(self) -> tuple[str, ...]:
@@ -223,37 +257,65 @@ class Timer:
             knots = problem.pieces[k].u.size
             steps = max(self._steps * finer, PER_POSE * (knots - 1))
             sampled = sample_piece(problem, k, profile, steps, weight)
-            t = now + sampled.t * max(sampled.excess, 1.0)
-            legs.append(_Leg(k, t, sampled.u))
+            poses = sampled.path.poses_at(sampled.u)
+            vehicle = self._space.vehicle
+            footprint = () if vehicle is None else vehicle.footprint
+            used = cap_use(sampled.t, sampled.u, sampled.path, poses, footprint)
+            t = now + sampled.t * max(sampled.excess, used, 1.0)
+            legs.append(_Leg(sampled.path, t, sampled.u))
             now = float(t[-1]) + wait * (1 + 1e-6) + DWELL
         return legs
 
-    def _proved(
-        self, path: Path, trajectory: Trajectory, profile: SpeedProfile
-    ) -> tuple[Timing, Report]:
-        """Return the timing once `validate` has accepted it, slower if need be.
-
-        The report is that of the trajectory before it was slowed down.
-        """
-        report = self._validate(trajectory)
+    def _tried(self, trajectory: Trajectory) -> _Try:
+        """Return a trajectory as it was judged, with waits as long as it demands."""
+        one = self._judged(trajectory)
         for _ in range(WAITS):
-            if not _waits_only(report):
+            if not _waits_only(one.report):
                 break
-            trajectory = _with_longer_waits(trajectory, report)
+            one = self._judged(_with_longer_waits(one.proved.trajectory, one.report))
+        return one
+
+    def _judged(self, trajectory: Trajectory) -> _Try:
+        proved = prove(
+            trajectory,
+            self._space,
+            self._tolerances,
+            allow_unreachable=self._allow_unreachable,
+            max_parts=PARTS,
+        )
+        return _Try(proved, report_of(proved))
+
+    def _tighten(
+        self,
+        tight: list[FloatArray],
+        legs: list[_Leg],
+        chosen: list[PieceProfile],
+        proved: Proved,
+    ) -> None:
+        """Make the limits tighter where they were broken, looser where they are not."""
+        spans, asked = proved.parts.spans, slowdowns_of(proved)
+        for i, (leg, profile) in enumerate(zip(legs, chosen, strict=True)):
+            pad = AROUND * float(leg.t[-1] - leg.t[0]) / self._steps
+            times = np.interp(profile.u, leg.u, leg.t)
+            tight[i] = tightened(tight[i], times, (spans.t0, spans.t1), asked, pad)
+
+    def _proved(self, path: Path, one: _Try, profile: SpeedProfile) -> Timing:
+        """Return the timing once `validate` has accepted it, slower if need be."""
+        trajectory, report = one.proved.trajectory, one.report
+        if not report.valid:
             report = self._validate(trajectory)
         if not report.valid and report.speed_factor > 0:
             # A factor in a report has been proved by validating again.
             trajectory = trajectory.scaled(report.speed_factor)
         elif not report.valid:
-            return self._refused(path, profile, report), report
+            return self._refused(path, profile, report)
         message = (
             f"{path.name} by {self._space.name}: {trajectory.duration:.3f} s, "
             f"the optimum is {profile.duration:.3f} s"
         )
         found = TimingStatus.FOUND
         name = self._space.name
-        timing = Timing(name, path.name, found, trajectory, profile, None, message)
-        return timing, report
+        return Timing(name, path.name, found, trajectory, profile, None, message)
 
     def _validate(self, trajectory: Trajectory) -> Report:
         return validate(
@@ -281,46 +343,22 @@ class Timer:
         )
 
 
-def _trajectory(path: Path, problem: TimingProblem, legs: list[_Leg]) -> Trajectory:
+def _trajectory(path: Path, legs: list[_Leg]) -> Trajectory:
     return Trajectory.from_poses(
         np.concatenate([leg.t for leg in legs]),
-        np.concatenate([problem.pieces[leg.piece].poses_at(leg.u) for leg in legs]),
+        np.concatenate([leg.piece.poses_at(leg.u) for leg in legs]),
         name=path.name,
         reference_point=path.reference_point,
     )
 
 
-def _tighten(
-    tight: list[FloatArray],
-    legs: list[_Leg],
-    chosen: list[PieceProfile],
-    report: Report,
-    steps: int,
-) -> None:
-    """Make the limits tighter where a report says that they are broken."""
-    slower = [np.ones(weight.size) for weight in tight]
-    for violation in report.violations:
-        if violation.value is None or violation.bound <= 0:
-            continue
-        # An undecided value may be within its bound: then by a little all the same.
-        factor = max(abs(violation.value) / violation.bound, 1.0) * (1 + SPARE)
-        if violation.unit.endswith("s²"):
-            factor = math.sqrt(factor)
-        # Near rest the samples' splines are to blame rather than the speed.
-        factor = min(factor, MOST_PROVED if violation.is_proved else MOST_UNDECIDED)
-        for weight, leg, profile in zip(slower, legs, chosen, strict=True):
-            pad = AROUND * float(leg.t[-1] - leg.t[0]) / steps
-            ends = violation.t_start - pad, violation.t_end + pad
-            if ends[1] < leg.t[0] or ends[0] > leg.t[-1]:
-                continue
-            low, high = np.interp(ends, leg.t, leg.u)
-            at = slice(
-                max(int(np.searchsorted(profile.u, low)) - 1, 0),
-                int(np.searchsorted(profile.u, high)) + 1,
-            )
-            weight[at] = np.maximum(weight[at], factor)
-    for weight, more in zip(tight, slower, strict=True):
-        weight *= more
+def _is_enough(tries: list[_Try], optimum: float) -> bool:
+    """Return whether more tries are not worth their time."""
+    worth = [one.estimate for one in tries]
+    best = int(np.argmin(worth))
+    if tries[best].report.valid and worth[best] < (1 + LOSS) * optimum:
+        return True
+    return len(tries) - 1 - best >= PATIENCE and math.isfinite(worth[best])
 
 
 def _worth(timing: Timing) -> float:

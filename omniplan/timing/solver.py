@@ -12,6 +12,7 @@ import numpy.typing as npt
 from configspace import Vehicle
 from omniplan.timing.kernels import rows_along, time_jobs
 from omniplan.timing.path_motion import PathPiece
+from omniplan.timing.rounding import rounded
 from omniplan.timing.rows import ONE_SIDED, RowKind, TimingRow, row_table, timing_rows
 
 __all__ = ["PieceProfile", "TimingProblem"]
@@ -23,6 +24,12 @@ GRID = 500
 """Least number of grid intervals per piece."""
 PER_KNOT = 2
 """Least number of grid intervals between two poses of a path."""
+LEAST_PACE = 1e-6
+"""A wheel's velocity per u̇ counts as this at least."""
+MOST_CUTS = 64
+"""An interval in which much time is spent is cut into so many at most ..."""
+LEAST_CUTS = 3
+"""... if one takes so many times the mean at least."""
 HALVINGS = 6
 """How often the first and the last interval of a piece are halved."""
 
@@ -59,7 +66,11 @@ class TimingProblem:
     """Pieces of paths for one vehicle, ready to be timed together."""
 
     def __init__(
-        self, pieces: Sequence[PathPiece], vehicle: Vehicle, grid: int = GRID
+        self,
+        pieces: Sequence[PathPiece],
+        vehicle: Vehicle,
+        grid: int = GRID,
+        finer: Sequence[IntArray | None] | None = None,
     ) -> None:
         """Lay a grid over every piece.
 
@@ -69,8 +80,11 @@ class TimingProblem:
         vehicle : Vehicle
         grid : int
             Least number of intervals per piece.
+        finer : sequence of (n,) int, ≥ 1, optional
+            Of every piece into how many each of its intervals is cut; None: into one.
         """
         self.pieces = tuple(pieces)
+        self._vehicle, self._grid = vehicle, grid
         speeds = np.concatenate([p.max_speed for p in pieces])
         yaw_rates = np.concatenate([p.max_yaw_rate for p in pieces])
         self._caps = np.stack([speeds, yaw_rates])
@@ -90,7 +104,9 @@ class TimingProblem:
         self._heading = np.concatenate([p.heading for p in pieces], axis=1)
         self._point = np.array([p.point for p in pieces], dtype=np.complex128)
         self._offsets = np.cumsum([0, *(p.u.size - 1 for p in pieces)])
-        knots, h0, h1 = zip(*(_grid(piece, grid) for piece in pieces), strict=True)
+        cuts: Sequence[IntArray | None] = finer or [None] * len(pieces)
+        grids = [_cut(_grid(p, grid), cut) for p, cut in zip(pieces, cuts, strict=True)]
+        knots, h0, h1 = zip(*grids, strict=True)
         self._knot = np.concatenate(
             [k + offset for k, offset in zip(knots, self._offsets, strict=False)]
         )
@@ -99,24 +115,79 @@ class TimingProblem:
         self._u = np.concatenate([self._nodes(k) for k in range(len(pieces))])
         self._most_nodes = int(np.diff(self._first).max()) + 1
 
+    def rounded(self, piece: int, reach: FloatArray) -> TimingProblem:
+        """Return the problem of one piece without jumps of its third derivative.
+
+        Parameters
+        ----------
+        piece : int
+        reach : (k - 2,) float, m
+            How far about every inner knot, as of `omniplan.timing.rounding.rounded`.
+        """
+        given = rounded(self.pieces[piece], reach)
+        return TimingProblem([given], self._vehicle, self._grid)
+
+    def refined(self, profiles: Sequence[Sequence[PieceProfile]]) -> TimingProblem:
+        """Return the problem on a finer grid where much time is spent in an interval.
+
+        ü is constant over each; where a wheel is near the centre of rotation, a few
+        centimetres may take a good part of the whole time.
+
+        Parameters
+        ----------
+        profiles : sequence of sequences of PieceProfile
+            Those of each piece, on the grid as it is.
+        """
+        finer = [_cuts_of(some, self._grid) for some in profiles]
+        if all(cuts is None for cuts in finer):
+            return self
+        return TimingProblem(self.pieces, self._vehicle, self._grid, finer)
+
     @cached_property
-    def _steering(self) -> npt.NDArray[np.bool_]:
-        return np.array([row.kind == RowKind.STEER_ACCELERATION for row in self.rows])
+    def _swinging(self) -> tuple[tuple[complex, float], ...]:
+        """The wheels whose α̈ counts: where, and how much of a limit it uses, s²."""
+        weights = {
+            RowKind.STEER_ACCELERATION: lambda row: 1 / row.bound,
+            RowKind.BESIDE_RATE: lambda row: (
+                (abs(row.lever) + abs(row.coupling)) / row.bound
+            ),
+        }
+        return tuple(
+            (row.point, weights[row.kind](row))
+            for row in self.rows
+            if row.kind in weights
+        )
 
     @property
     def bounds_steering_acceleration(self) -> bool:
         """Whether third derivatives of the samples' splines matter."""
-        return bool(self._steering.any())
+        return bool(self._swinging)
 
-    def steering_gain(self, piece: int, sigma: int, u: FloatArray) -> FloatArray:
-        """Return the largest |α'| over the wheel's limit on α̈, (n,) s²/m.
+    def steering_gain(self, piece: int, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the largest |α'| and 1 / |g|, each by how much α̈ counts, (n,).
+
+        g is the velocity of a wheel per u̇ and α' how fast it turns per u: what α̈ is
+        per ü, s²/m, and per third derivative of the path over u̇, s² .
 
         Parameters
         ----------
         u : (n,) float, m
         """
-        a, _ = self.coefficients(piece, sigma, u)
-        return np.asarray(np.abs(a[:, self._steering]).max(axis=1))
+        given = self.pieces[piece]
+        h = 1e-5 * given.length
+        at = np.clip(u, given.u[0] + 2 * h, given.u[-1] - 2 * h)
+        x, y, theta = np.moveaxis(
+            given.poses_at((at + h * np.arange(-2, 3)[:, None]).ravel()), 1, 0
+        ).reshape(3, 5, -1)
+        turning, lever = np.zeros(u.shape), np.zeros(u.shape)
+        for point, weight in self._swinging:
+            place = x + 1j * y + np.exp(1j * theta) * (point - given.point)
+            g = (place[2:] - place[:-2]) * np.exp(-1j * theta[1:-1]) / (2 * h)
+            size = np.maximum(np.abs(g[1]), LEAST_PACE)
+            swing = np.abs(np.angle(g[2] * g[0].conj())) / (2 * h)
+            turning = np.maximum(turning, weight * swing)
+            lever = np.maximum(lever, weight / size)
+        return turning, lever
 
     def nodes(self, piece: int) -> FloatArray:
         """Return the grid of a piece, (n,) m from the start of the path."""
@@ -242,6 +313,33 @@ class TimingProblem:
         used = a * change[:, None] + b * speed[:, None] ** 2
         used = np.where(self._one_sided, used, np.abs(used))
         return np.asarray(np.sqrt(np.maximum(used, 0.0).max(axis=1)))
+
+
+def _cuts_of(profiles: Sequence[PieceProfile], grid: int) -> IntArray | None:
+    """Return into how many parts intervals are cut; None where it is not worth it."""
+    cuts: IntArray | None = None
+    for profile in profiles:
+        if profile.stuck >= 0 or not np.isfinite(profile.duration):
+            continue
+        share = np.diff(profile.times) * grid / profile.duration
+        asked = np.clip(np.ceil(share), 1, MOST_CUTS).astype(np.int64)
+        cuts = asked if cuts is None else np.maximum(cuts, asked)
+    return None if cuts is None or cuts.max() < LEAST_CUTS else cuts
+
+
+def _cut(
+    grid: tuple[IntArray, FloatArray, FloatArray], cuts: IntArray | None
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return a grid with its intervals cut into equal parts."""
+    if cuts is None:
+        return grid
+    knot = np.repeat(grid[0], cuts)
+    h0, h1 = np.repeat(grid[1], cuts), np.repeat(grid[2], cuts)
+    place = np.arange(knot.size) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    of = np.repeat(cuts, cuts)
+    first = h0 + (h1 - h0) * place / of
+    last = np.where(place + 1 == of, h1, h0 + (h1 - h0) * (place + 1) / of)
+    return knot, first, last
 
 
 def _grid(piece: PathPiece, least: int) -> tuple[IntArray, FloatArray, FloatArray]:

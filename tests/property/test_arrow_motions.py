@@ -16,8 +16,8 @@ import configspace
 from configspace import InvalidInput, Vehicle
 from omniplan import InvalidTrajectory, Trajectory
 from omniplan.trajectory import Form
-from services.arrow import read_table, write_table
-from services.arrow_motions import (
+from services.protocol.arrow import read_table, write_table
+from services.protocol.arrow_motions import (
     TWIST,
     table_of_trajectories,
     table_of_twists,

@@ -57,7 +57,7 @@ def any_pose(rng: np.random.Generator, size: float = 6.0) -> FloatArray:
 
 @pytest.mark.parametrize("footprint", [BOX, L_SHAPE], ids=["box", "l-shape"])
 @given(seed=seeds, clearance=st.sampled_from([0.0, 0.05, 0.4]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_poses_agree_with_brute_force(
     footprint: FloatArray, seed: int, clearance: float
 ) -> None:
@@ -95,7 +95,7 @@ def any_move(rng: np.random.Generator) -> Move:
 
 @pytest.mark.parametrize("footprint", [BOX, L_SHAPE], ids=["box", "l-shape"])
 @given(seed=seeds, clearance=st.sampled_from([0.0, 0.05]))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_moves_agree_with_dense_sampling(
     footprint: FloatArray, seed: int, clearance: float
 ) -> None:
@@ -122,7 +122,7 @@ def test_moves_agree_with_dense_sampling(
 
 
 @given(seed=seeds, form=st.sampled_from(["origin", "elsewhere"]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_trajectories_agree_with_dense_sampling(seed: int, form: str) -> None:
     rng = np.random.default_rng(seed)
     polygons = hall(rng, 4)
@@ -148,7 +148,7 @@ def test_trajectories_agree_with_dense_sampling(seed: int, form: str) -> None:
 
 
 @given(seed=seeds)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_swept_area_agrees_with_painted_cells(seed: int) -> None:
     rng = np.random.default_rng(seed)
     move = any_move(rng)

@@ -46,8 +46,31 @@ def twists(asked: Motion, ahead: float) -> list[tuple[float, float, float]]:
     return [(sign * vx, sign * vy, turn) for sign in (1, -1) for turn in turns]
 
 
-def can(vehicle: Vehicle, twist: tuple[float, float, float], slack: float) -> bool:
+def at_least_as_tight(
+    vehicle: Vehicle, twist: tuple[float, float, float]
+) -> list[tuple[float, float, float]]:
+    """Return the twists with the same velocity of K round smaller circles."""
+    vx, vy, omega = twist
+    q = abs(omega) / math.hypot(vx, vy) / vehicle.boundary_curvature
+    asked = q if q < 1 else 2 - 1 / q
+    found = []
+    for k in range(200):
+        kappa_n = asked + (2 - asked) * k / 200
+        ratio = kappa_n if kappa_n < 1 else 1 / (2 - kappa_n)
+        found.append((vx, vy, omega * ratio / q))
+    return found
+
+
+def can(
+    vehicle: Vehicle,
+    twist: tuple[float, float, float],
+    slack: float,
+    or_tighter: bool = False,
+) -> bool:
     """Return whether a twist is permitted in either representation."""
+    if or_tighter:
+        twists = at_least_as_tight(vehicle, twist)
+        return any(can(vehicle, one, slack) for one in twists)
     for sign in (1, -1):
         kappa_n, beta, v_s = from_twist(*twist, vehicle.boundary_curvature, sign)
         body = rigid_body(vehicle, kappa_n, beta, reverse=v_s < 0)
@@ -66,8 +89,9 @@ def test_what_is_promised_is_permitted_and_what_is_refused_is_not(
     space = configspace.build_space(vehicle, configspace.Grid(16, 24), cache=False)
     found = shortfalls(FleetVehicle("v", space), [asked], allow_unreachable=True)
     ahead = vehicle.mobility.line_beta or 0.0
-    able = [can(vehicle, twist, CLEAR) for twist in twists(asked, ahead)]
-    surely = [can(vehicle, twist, -CLEAR) for twist in twists(asked, ahead)]
+    tighter = isinstance(asked, Radius)
+    able = [can(vehicle, twist, CLEAR, tighter) for twist in twists(asked, ahead)]
+    surely = [can(vehicle, twist, -CLEAR, tighter) for twist in twists(asked, ahead)]
     assert len(found) >= able.count(False)
     assert len(found) <= surely.count(False)
     for one in found:

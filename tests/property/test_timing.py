@@ -34,7 +34,7 @@ def timed(path: Path | Trajectory, space: PermissibleSpace) -> Timing:
     return time_path(path, space, grid=200, steps=250)
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(SEEDS, st.sampled_from(ALL))
 def test_what_is_found_is_proved_and_what_is_not_says_where(
     seed: int, kind: VehicleKind
@@ -55,7 +55,8 @@ def test_what_is_found_is_proved_and_what_is_not_says_where(
     assert timing.trajectory is not None
     assert timing.profile is not None
     assert validate(timing.trajectory, space).valid
-    assert timing.trajectory.duration > timing.profile.duration * (1 - 1e-3)
+    # Where jumps of the path are rounded off it may be a little faster.
+    assert timing.trajectory.duration > timing.profile.duration * (1 - 1e-2)
     given_path = path_of(path)
     # It stays on the path: every sample lies on the splines, from end to end.
     ends = timing.trajectory.samples[[0, -1]]

@@ -84,7 +84,9 @@ def assert_alike(
         assert row["duration"] == trajectory.duration
         if report.valid:
             used = max(1 - row["margin"], 0.05), max(1 - report.margin, 0.05)
-            assert used[0] == pytest.approx(used[1], rel=2.5e-3), at
+            # Near rests neither knows accelerations of steering any better.
+            is_blunt = row["limit"] in {"STEER_ACCELERATION", "WHEEL_ACCELERATION"}
+            assert used[0] == pytest.approx(used[1], rel=2e-2 if is_blunt else 2.5e-3)
             assert row["t"] is None
         else:
             told = report.headline
@@ -174,9 +176,16 @@ def test_a_refusal_names_wheel_place_and_numbers() -> None:
 
 
 def test_everything_the_kernels_do_not_know_is_asked_for() -> None:
-    known = space_of("mecanum")
+    known, steered = space_of("mecanum"), space_of("choreo-frc-swerve").vehicle
+    assert steered is not None
+    winding = [
+        wheel.model_copy(update={"steering_range_deg": (-270.0, 270.0)})
+        for wheel in steered.wheels
+    ]
     spaces = [
-        space_of("two-turntables"),
+        build_space(
+            steered.model_copy(update={"wheels": tuple(winding)}), GRID, cache=False
+        ),
         dataclasses.replace(
             known, vehicle=None, header=dataclasses.replace(known.header, name="sheet")
         ),
@@ -189,25 +198,28 @@ def test_everything_the_kernels_do_not_know_is_asked_for() -> None:
     )
     trajectories = [own, random_twists(np.random.default_rng(0), "twists", rest=True)]
     found = assert_alike(trajectories, [known, *spaces])
-    assert found["asked"] == 5 / 6
+    assert found["asked"] == 4 / 6
 
 
 @pytest.mark.parametrize("name", configspace.catalog())
 def test_the_rows_are_those_of_the_vehicle_judge(name: str) -> None:
     vehicle = configspace.load_vehicle(name)
-    judge = VehicleJudge(vehicle, Tolerances(), is_own=False, has_rates=True)
-    wanted = [
+    judge = VehicleJudge(
+        vehicle, Tolerances(), is_own=False, has_rates=True, has_swing=True
+    )
+    wanted = {
         (row.limit, judge.wheel_ids[row.wheel] if row.wheel >= 0 else "")
         for row in judge.rows
-    ]
+    }
     fleet = fleet_of([vehicle], Tolerances())
-    found = [(label.limit, label.wheel) for label in fleet.labels]
-    if is_plain(build_space(vehicle, Grid(8, 16), cache=False)):
-        # Both representations have a row of their own for a steering range.
-        doubled = [row for row in wanted for _ in range(1 + (row[0] == "STEER_RANGE"))]
-        assert sorted(found) == sorted(doubled)
-    else:
-        assert len(wanted) > 0
+    assert {(label.limit, label.wheel) for label in fleet.labels} == wanted
+    own = VehicleJudge(vehicle, Tolerances(), is_own=True, has_rates=False)
+    wanted = {
+        (row.limit, own.wheel_ids[row.wheel] if row.wheel >= 0 else "")
+        for row in own.rows
+    }
+    fleet = fleet_of([vehicle], Tolerances(), is_own=True)
+    assert {(label.limit, label.wheel) for label in fleet.labels} == wanted
 
 
 def test_parts_are_those_of_the_motion() -> None:

@@ -12,9 +12,9 @@ from omniplan import Tolerances, Trajectory
 from omniplan.batch.chords import HIGH, LOW, ROOM
 from omniplan.batch.coarse import GROUP, SCRATCH, groups_of, screen
 from omniplan.batch.fleet import Fleet, fleet_of
+from omniplan.batch.kinds import BOUND, KIND, RANGE, RANGE_ERROR
 from omniplan.batch.motions import LANES, Motions, motions_of
 from omniplan.batch.refine import KEPT, NO, YES, load, one_row
-from omniplan.batch.rows import BOUND, KIND, RANGE, RANGE_ERROR
 from omniplan.bench_cases import KINDS, random_trajectories, random_vehicles
 
 FloatArray = npt.NDArray[np.float64]

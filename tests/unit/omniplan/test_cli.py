@@ -67,10 +67,10 @@ def test_unknown_criterion_is_bad_input(capsys: Capture) -> None:
     assert "one of duration, margin" in capsys.readouterr().err
 
 
-def test_damaged_data_sheet_is_a_failure(tmp_path: Path, capsys: Capture) -> None:
+def test_damaged_data_sheet_is_bad_input(tmp_path: Path, capsys: Capture) -> None:
     sheet = tmp_path / "bad.safetensors"
     sheet.write_bytes(b"nothing of use")
-    assert cli.main(["check", manoeuvre("docking"), "--vehicle", str(sheet)]) == 3
+    assert cli.main(["check", manoeuvre("docking"), "--vehicle", str(sheet)]) == 2
     assert "damaged" in capsys.readouterr().err
 
 
@@ -261,3 +261,29 @@ def test_the_schema_of_a_servers_configuration_is_published(capsys: Capture) -> 
     assert cli.main(["schema", "service"]) == 0
     schema = json.loads(capsys.readouterr().out)
     assert "queue" in schema["properties"]
+
+
+def piped(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command as a process whose output nobody watches."""
+    command = [sys.executable, "-m", "omniplan.cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_fleet_leaves_no_blank_lines_where_nobody_watches(tmp_path: Path) -> None:
+    out = str(tmp_path / "verdicts.parquet")
+    done = piped("check", manoeuvre("docking"), "--fleet", "ackermann", "--out", out)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    lines = [f"{x},0,0\n" for x in (0, 1, 2)]
+    path = tmp_path / "path.csv"
+    path.write_text("x,y,theta\n" + "".join(lines))
+    done = piped("check", str(path), "--fleet", "ackermann", "--out", out)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_angles_of_requirements_are_answered_in_degrees(capsys: Capture) -> None:
+    assert cli.main(["select", "--fleet", "mecanum", "--require", "crab 400 deg"]) == 2
+    err = capsys.readouterr().err
+    assert "400 deg" in err
+    assert "180 deg" in err
+    assert "rad" not in err

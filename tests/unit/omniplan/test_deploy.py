@@ -15,7 +15,7 @@ import pytest
 
 from omniplan import cli
 from omniplan.shell.answers import BAD_INPUT
-from services.config import ServiceConfig, load_config, variables
+from services.operating.config import ServiceConfig, load_config, variables
 
 FOLDER = Path(__file__).parents[3] / "examples" / "deploy"
 CONFIG = FOLDER / "server.toml"

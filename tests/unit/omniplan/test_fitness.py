@@ -60,6 +60,25 @@ def test_smallest_radius_of_an_ackermann_steered_vehicle(space_of: SpaceOf) -> N
     assert "any speed asked, nothing offered [STEER_RANGE of wheel" in str(found[0])
 
 
+def test_a_smaller_radius_will_do() -> None:
+    """With the centre on a wheel nothing goes, on a smaller circle it does."""
+    wheels = [
+        {"id": f"w{i}", "type": "steered", "x": x, "y": y, "max_speed": 1.0}
+        for i, (x, y) in enumerate([(0.0, 0.5), (0.5, -0.4), (-0.5, -0.4)])
+    ]
+    vehicle = configspace.vehicle_from_data({"name": "three", "wheels": wheels})
+    space = configspace.build_space(vehicle, cache=False)
+    kappa_n, beta, _ = configspace.from_twist((1.0, 0.0, 1 / 0.5), space.kappa_g)
+    assert float(configspace.exact_v_max(vehicle, kappa_n, beta)) == 0
+    assert short(space, "radius 0.5 m") == ()
+    # K is the slower the smaller the circle: the farthest wheel rolls 1 m/s.
+    fastest = 0.5 / math.hypot(0.5, 0.9)
+    assert short(space, f"radius 0.5 m at {fastest * 0.97:.6g} m/s") == ()
+    (left, *_) = short(space, f"radius 0.5 m at {fastest * 1.01:.6g} m/s")
+    assert 0.97 * fastest < (left.offered or 0.0) < fastest
+    assert left.limit == "SINGULAR"
+
+
 def test_turning_on_the_spot_is_limited_by_the_farthest_wheel(
     space_of: SpaceOf,
 ) -> None:

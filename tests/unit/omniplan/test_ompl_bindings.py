@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import gc
 import math
+import subprocess
+import sys
 import weakref
 from typing import Any
 
@@ -378,3 +380,48 @@ def test_a_heading_of_pi_is_out_of_bounds_and_minus_pi_is_not() -> None:
     space = _se2()
     assert not space.satisfiesBounds(_state(space, 1, 1, math.pi))
     assert space.satisfiesBounds(_state(space, 1, 1, -math.pi))
+
+
+HANGS = """
+from omniplan.sampling.ompl_bindings import base, bounds_of, geometric
+
+
+class Cost(base.OptimizationObjective):
+    def motionCost(self, first, second):
+        return base.Cost(1.0)
+
+
+def main():
+    space = base.SE2StateSpace()
+    space.setBounds(bounds_of((0, 0, 10, 10)))
+    si = base.SpaceInformation(space)
+    si.setStateValidityChecker(lambda state: True)
+    si.setup()
+    first, second = space.allocState(), space.allocState()
+    first.setXY(1, 1)
+    first.setYaw(0)
+    second.setXY(9, 1)
+    second.setYaw(0)
+    problem = base.ProblemDefinition(si)
+    problem.setStartAndGoalStates(first, second)
+    problem.setOptimizationObjective(Cost(si))
+    planner = geometric.PRM(si)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    print("begins", flush=True)
+    planner.solve(0.2)
+    print("ends", flush=True)
+
+
+main()
+"""
+
+
+@pytest.mark.slow
+def test_prm_hangs_with_a_cost_of_python() -> None:
+    with pytest.raises(subprocess.TimeoutExpired) as caught:
+        subprocess.run(
+            [sys.executable, "-c", HANGS], capture_output=True, timeout=15, check=True
+        )
+    assert b"begins" in (caught.value.stdout or b"")
+    assert b"ends" not in (caught.value.stdout or b"")

@@ -7,6 +7,11 @@ import pytest
 
 import configspace
 from omniplan import Trajectory, validate
+from omniplan.judging import proof
+from omniplan.judging.rows import Bounds
+from omniplan.judging.vehicle_judge import VehicleJudge
+from omniplan.motion import Enclosure, motion_of
+from omniplan.proving import prove
 
 
 @pytest.fixture(scope="module")
@@ -49,3 +54,95 @@ def test_too_fast_hides_nothing_of_the_configuration(
     report = validate(trajectory.scaled(1.02 * factor), space)
     assert {v.limit for v in report.violations} == {"SPEED"}
     assert report.speed_factor == pytest.approx(1 / 1.02, rel=2e-3)
+
+
+def steered_so_far(to: float) -> configspace.PermissibleSpace:
+    """The four-wheel vehicle whose first wheel turns to one side only."""
+    data = configspace.load_vehicle("ift-four-steered").model_dump(
+        mode="json", exclude_none=True
+    )
+    data["wheels"][0]["steering_range_deg"] = [-155.0, to]
+    return configspace.build_space(
+        configspace.vehicle_from_data(data), configspace.Grid(20, 36), cache=False
+    )
+
+
+def turning_about(space: configspace.PermissibleSpace, share: float) -> Trajectory:
+    """Every wheel turns at a share of its largest steering rate, in and out again."""
+    beta = np.radians([0.0, -90.0, -45.0, 0.0])
+    t = np.array([0.0, 0.5, 0.75, 1.0]) / share
+    assert space.vehicle is not None
+    return Trajectory.from_omni_curve(t, [0.0] * 4, beta, [0.5] * 4, space.vehicle)
+
+
+@pytest.mark.parametrize("share", [1.0, 1 - 1e-9, 1 - 1e-6, 1 + 1e-9])
+def test_at_a_limit_all_along_few_parts_are_needed(share: float) -> None:
+    space = steered_so_far(0.0)
+    assert prove(turning_about(space, share), space).parts.stands.size < 5000
+
+
+def test_a_wheel_may_leave_and_reach_its_very_stop() -> None:
+    space = steered_so_far(0.0)
+    assert validate(turning_about(space, 0.9), space).valid
+    beyond = steered_so_far(-1e-6)
+    report = validate(turning_about(beyond, 0.9), beyond)
+    assert {(v.limit, v.wheel) for v in report.violations} == {
+        ("STEER_RANGE", "front-left")
+    }
+    assert {v.t for v in report.violations} == {0.0, 1 / 0.9}
+
+
+def test_what_is_decided_is_not_judged_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = steered_so_far(155.0)
+    trajectory = turning_about(space, 0.999)
+    seen = []
+    ask = VehicleJudge.utilisation
+
+    def counted(self: VehicleJudge, part: Enclosure, sign: int) -> Bounds:
+        seen.append(part.dt.size)
+        return ask(self, part, sign)
+
+    monkeypatch.setattr(VehicleJudge, "utilisation", counted)
+    parts = prove(trajectory, space).parts
+    # Each part and each of those it comes from, in both representations, once.
+    assert sum(seen) <= 2 * 2 * parts.stands.size
+
+
+def test_what_its_own_vehicle_cannot_drive_is_a_standstill() -> None:
+    """Where it is blocked v_max is 0: v_n is a share of nothing, for any vehicle."""
+    owner, other = steered_so_far(0.0).vehicle, steered_so_far(155.0)
+    assert owner is not None
+    t, kappa_n = [0.0, 0.5, 1.5, 2.0], [0.2, 0.2, 0.1, 0.1]
+    own = Trajectory.from_omni_curve(t, kappa_n, [0.1, 0.2, 0.2, 0.1], [0.3] * 4, owner)
+    assert prove(own, other).parts.stands.all()
+    assert prove(own, other).parts.stands.size < 20
+    assert validate(own, other).valid
+
+
+def test_long_motions_are_halved_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How many parts there may be counts from those of the samples."""
+    monkeypatch.setattr(proof, "MAX_PARTS", 40)
+    space = steered_so_far(155.0)
+    assert space.vehicle is not None
+    t = np.linspace(0.0, 40.0, 81)
+    beta = 0.3 * np.sin(t)
+    ones = np.ones_like(t)
+    own = Trajectory.from_omni_curve(t, 0.3 * ones, beta, 0.5 * ones, space.vehicle)
+    quick = own.scaled(0.98 * validate(own, space).speed_factor)
+    assert validate(quick, space).valid
+
+
+def test_merged_parts_are_those_evaluated_as_a_whole(
+    space: configspace.PermissibleSpace,
+) -> None:
+    parts = prove(backwards(12), space).parts
+    motion = motion_of(backwards(12), is_own=False)
+    whole = motion.enclose(parts.spans)
+    assert parts.stands.size > 10
+    for name, values in vars(whole).items():
+        if name != "swing":
+            np.testing.assert_array_equal(getattr(parts.enclosure, name), values)
+    assert whole.swing is not None
+    assert parts.enclosure.swing is not None
+    for name, values in vars(whole.swing).items():
+        np.testing.assert_array_equal(getattr(parts.enclosure.swing, name), values)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import json
 import math
 import re
 import threading
+import weakref
 from typing import Any
 
 import numpy as np
@@ -255,6 +257,25 @@ def test_threads_do_not_meet(spaces: dict[str, PermissibleSpace]) -> None:
     assert all(each == expected for each in found.values())
 
 
+def test_the_checks_hold_nothing_that_holds_them(
+    spaces: dict[str, PermissibleSpace],
+) -> None:
+    class Mark:
+        pass
+
+    for state_space in (None, base.ReedsSheppStateSpace(2.0)):
+        si = _information(state_space)
+        sampling.equip(si, spaces["ackermann"], Disc(0, 0, 1))
+        si.checkMotion(_state(si, 2, 2, 0), _state(si, 5, 2, 0))
+        si.mark = Mark()
+        mark = weakref.ref(si.mark)
+        gc.collect()
+        assert isinstance(si.getMotionValidator(), sampling.MotionValidator)
+        del si
+        gc.collect()
+        assert mark() is None
+
+
 @pytest.mark.parametrize("reverse", [True, False])
 def test_line_spaces_have_the_least_radius(
     spaces: dict[str, PermissibleSpace], reverse: bool
@@ -389,9 +410,9 @@ def test_other_state_spaces_are_refused(spaces: dict[str, PermissibleSpace]) -> 
 
 
 @pytest.mark.parametrize(
-    "bounds", [(0, 0, 0, 1), (0, 0, math.inf, 1), (math.nan, 0, 1, 1)]
+    "bounds", [(0, 0, 0, 1), (0, 0, math.inf, 1), (math.nan, 0, 1, 1), (0, 1)]
 )
-def test_bounds_are_checked(bounds: tuple[float, float, float, float]) -> None:
+def test_bounds_are_checked(bounds: Any) -> None:
     with pytest.raises(InvalidInput, match="bounds"):
         sampling.bounds_of(bounds)
 
@@ -431,6 +452,44 @@ def test_plain_and_array_questions_agree(spaces: dict[str, PermissibleSpace]) ->
         piece = (kappa_n[i], beta_0[i], beta_1[i])
         assert intervals.permits(*piece) == permitted[i]
         assert intervals.piece_speed(*piece) == speed[i]
+
+
+def _slowest_of(
+    space: PermissibleSpace, kappa_n: float, beta_0: float, beta_1: float
+) -> float:
+    """Return the speed of a piece by a loop over all nodes around it."""
+    load = space.tables.load[0]
+    rows, columns = load.shape[0] - 1, load.shape[1] - 1
+    place = (kappa_n + 2) * rows / 4
+    row = min(int(place), rows - 1)
+    share = place - row
+    low, high = min(beta_0, beta_1), max(beta_0, beta_1)
+    first = math.floor((low + math.pi) * columns / (2 * math.pi))
+    last = math.ceil((high + math.pi) * columns / (2 * math.pi))
+    below = max(load[row, j % columns] for j in range(first, last + 1))
+    above = max(load[row + 1, j % columns] for j in range(first, last + 1))
+    return 1 / math.sqrt((1 - share) * below + share * above)
+
+
+@pytest.mark.parametrize("name", ["ift-four-steered", "mecanum"])
+def test_the_speed_of_a_piece_is_that_of_the_nodes_around_it(
+    spaces: dict[str, PermissibleSpace], name: str
+) -> None:
+    space = spaces[name]
+    intervals = sampling.PermittedIntervals(space)
+    rng = np.random.default_rng(6)
+    seen = 0
+    for _ in range(200):
+        k, b0 = rng.uniform(-2, 2), rng.uniform(-4, 4)
+        b1 = b0 + rng.normal(0, 1.5)
+        speed = intervals.piece_speed(k, b0, b1)
+        if speed == 0:
+            continue
+        seen += 1
+        assert speed == pytest.approx(_slowest_of(space, k, b0, b1), rel=1e-6)
+        dense = space.v_max(k, np.linspace(b0, b1, 500)).min()
+        assert 0.98 * dense < speed <= dense
+    assert seen > 50
 
 
 def test_questions_out_of_range_are_refused(

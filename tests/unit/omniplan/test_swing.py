@@ -110,8 +110,9 @@ def test_an_instant_at_which_a_wheel_stands_has_no_bound() -> None:
     instant = Swing(
         dt=np.zeros(1),
         h=np.zeros((2, 1)),
-        speed=np.array([[0.0], [1.0], [0.0]], dtype=np.complex128),
-        turn=np.array([[0.0], [0.0], [1.0]]),
+        speed=np.array([[0.0], [1.0], [0.0], [0.0]], dtype=np.complex128),
+        turn=np.array([[0.0], [0.0], [1.0], [0.0]]),
+        since=np.array([np.inf]),
         heading=np.array([[0.0], [0.0], [1.0], [0.0]]),
         point=0j,
     ).directions
@@ -210,13 +211,17 @@ def test_bounds_hold_against_differences(seed: int) -> None:
     assert close > checked / 4
 
 
+@pytest.mark.parametrize("divided", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_derivatives_and_their_bounds(seed: int) -> None:
+def test_derivatives_and_their_bounds(seed: int, divided: bool) -> None:
     """Each derivative is the difference of the one before, and within its bound."""
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.uniform(0.3, 0.6, 6))
     poses = np.cumsum(rng.normal(size=(6, 3)) * 0.3, axis=0)
     motion = pose_motion(Trajectory.from_poses(t, poses, reference_point=(0.3, 0.1)))
+    if divided:  # by a time with any origin
+        motion.rest, motion.since = None, t[:-1] - t[0] + 0.4
+        motion.since[3:] = t[3:-1] - t[-1] - 0.4
     whole = motion.intervals()
     bounds = motion.enclose(whole).swing
     assert bounds is not None
@@ -288,3 +293,29 @@ def test_halving_closes_the_bound_with_the_square_of_the_length() -> None:
         gaps.append(float((bound - np.abs(ends).max(axis=0)).max()))
     assert gaps[1] < gaps[0] / 3
     assert gaps[2] < gaps[1] / 3
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_near_rest_few_parts_tell_how_directions_swing(turned: bool) -> None:
+    """Divided by the time since rest, a twist that grows with it hardly changes."""
+    t = np.concatenate([[0.0, 1e-3], np.geomspace(2e-3, 1.0, 60)])
+    u = t**2 / 2
+    poses = np.stack([u, 0.4 * u**2 + u, 0.3 * u], axis=-1)
+    when = t
+    if turned:
+        when, poses = 1 - t[::-1], poses[::-1]
+    motion = pose_motion(Trajectory.from_poses(when, poses))
+    assert np.isfinite(motion.since[1:-1]).all()
+    parts = cut(motion, 2)
+    swing = motion.enclose(parts).swing
+    assert swing is not None
+    ends, bound = swing.directions.accelerations(0.3 + 0.2j)
+    plain = motion_of(Trajectory.from_poses(when, poses), is_own=False)
+    assert isinstance(plain, PoseMotion)
+    plain.since = np.full(when.size - 1, np.inf)
+    undivided = plain.enclose(parts).swing
+    assert undivided is not None
+    others, loose = undivided.directions.accelerations(0.3 + 0.2j)
+    np.testing.assert_allclose(ends, others, rtol=1e-6, atol=1e-6)
+    reached = np.abs(ends).max(axis=0)
+    assert np.median(bound - reached) < 0.1 * np.median(loose - reached)

@@ -16,8 +16,8 @@ FloatArray = npt.NDArray[np.float64]
 
 CORNERS = [[0.6, 0.3], [-0.5, 0.3], [-0.5, -0.4], [0.6, -0.4]]
 REFERENCE = (0.2, 0.1)
-ROUNDING = 1e-3
-"""Between two samples a cap may be passed by this share."""
+ROUNDING = 1e-9
+"""Of the differences: a cap is not passed between the samples either."""
 
 
 def mecanum(footprint: list[list[float]]) -> PermissibleSpace:

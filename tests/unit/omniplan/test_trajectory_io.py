@@ -137,3 +137,15 @@ def test_a_file_holds_one_form(tmp_path: Path) -> None:
         with pytest.raises(InvalidInput, match="exactly one form"):
             write_trajectories(tmp_path / "no.csv", mixed)
     assert not (tmp_path / "no.csv").exists()
+
+
+def test_swapped_arguments_are_said(tmp_path: Path) -> None:
+    line = Trajectory.from_poses([0, 1], [[0, 0, 0], [1, 0, 0]])
+    file = tmp_path / "one.csv"
+    with pytest.raises(InvalidInput, match="the name of a file, before"):
+        write_trajectories([line], file)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="a list of trajectories or paths"):
+        write_trajectories(file, "one.csv")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match=r"trajectories\[1\]: int"):
+        write_trajectories(file, [line, 3])  # type: ignore[list-item]
+    assert not file.exists()

@@ -123,3 +123,24 @@ def test_no_way_is_said_where_there_is_none(space: PermissibleSpace) -> None:
     # Straight ahead and straight back are apart with stops at ±155°.
     change = changer(space).change((0.0, math.radians(100)), (0.0, math.pi))
     assert all(math.isinf(way.time) for way in change.ways)
+
+
+@pytest.mark.parametrize("line", [0.0, math.pi])
+def test_rounding_beside_the_line_does_not_keep_a_vehicle_from_steering(
+    line: float,
+) -> None:
+    vehicle = configspace.load_vehicle("ackermann")
+    on_line = configspace.build_space(vehicle, Grid(100, 180), cache=False)
+    ways = changer(on_line)
+    side = 1 if line == 0 else -1
+    exact, measured = (
+        ways.change((side * 0.6, line + aside), (-side * 0.6, line - aside))
+        for aside in (0.0, 1e-5)
+    )
+    if line == 0:
+        assert 1 < exact.ways[0].time < 2
+    else:  # turned round the wheels are out of their ranges
+        assert math.isinf(exact.ways[0].time)
+    assert measured.ways[0].time == exact.ways[0].time
+    beyond = ways.change((0.6, 0.02), (-0.6, -0.02))
+    assert math.isinf(beyond.ways[0].time)

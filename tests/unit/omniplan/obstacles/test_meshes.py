@@ -35,7 +35,7 @@ def test_a_box_casts_its_ground_plan() -> None:
 
 
 def test_a_ball_is_cut_at_both_heights() -> None:
-    ball = creation.icosphere(subdivisions=5, radius=1.0)
+    ball = creation.icosphere(subdivisions=4, radius=1.0)
     for low, high, radius in (
         (-2, 2, 1),
         (0.6, 2, 0.8),
@@ -44,7 +44,7 @@ def test_a_ball_is_cut_at_both_heights() -> None:
     ):
         largest = math.sqrt(1 - 0.1**2) if (low, high) == (0.1, 0.3) else radius
         area = shadow("ball", ball, (low, high)).area
-        assert area == pytest.approx(math.pi * largest**2, rel=3e-3)
+        assert area == pytest.approx(math.pi * largest**2, rel=1e-2)
 
 
 def test_a_table_leaves_room_below_its_top() -> None:

@@ -1,0 +1,1 @@
+"""Optimising: trajectories made faster, smoother or permitted by a solver."""

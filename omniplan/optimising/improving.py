@@ -1,0 +1,383 @@
+"""`omniplan.optimise`: a better trajectory near the one given, proved, or why not."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import get_args
+
+from configspace import InvalidInput, PermissibleSpace, Problem
+from configspace.space import require_space
+from omniplan.errors import InvalidTrajectory
+from omniplan.judging.rows import Tolerances
+from omniplan.obstacles import CollisionChecker, Obstacles
+from omniplan.optimising.answers import Answers
+from omniplan.optimising.attempts import Attempts, Candidate, Task
+from omniplan.optimising.limits import rules_of, top_speed
+from omniplan.optimising.realising import Realised
+from omniplan.optimising.separation import Surroundings
+from omniplan.optimising.setting import Box, Objective
+from omniplan.optimising.warm_start import (
+    Course,
+    courses_of,
+    guess_of,
+    merged,
+    rounded,
+)
+from omniplan.path import Path
+from omniplan.planning.result import Plan, PlanStatus
+from omniplan.trajectory import Trajectory, require_motion
+from omniplan.validation import validate
+
+__all__ = ["optimise"]
+
+INTERVALS = 40
+"""Of the longest way between two stops."""
+GAIN = 1e-3
+"""What is better by less than this share is no better."""
+LONGER = 1.25
+"""How much longer than its fastest timing a smooth motion on a path may take."""
+FIRST = 0.6
+"""Share of the time for a first try, if others may follow."""
+
+
+def optimise(
+    motion: Trajectory | Path | Plan,
+    space: PermissibleSpace,
+    obstacles: Obstacles | None = None,
+    *,
+    objective: Objective = "time",
+    bounds: Sequence[float] | None = None,
+    clearance: float = 0.0,
+    keep_ends: bool = True,
+    intervals: int = INTERVALS,
+    max_iterations: int = 300,
+    time: float = 10.0,
+    tolerances: Tolerances | None = None,
+    allow_unreachable: bool = False,
+) -> Plan:
+    """Return a better trajectory near the one given.
+
+    A local optimum: the way round obstacles stays. Stops are kept, or driven through
+    where the vehicle can do so and that is better; every limit that `validate` judges
+    and every obstacle is kept, and what is returned has been proved to.
+
+    Parameters
+    ----------
+    motion : Trajectory, Path or Plan
+        Where to start, of poses: that of `omniplan.plan`, or any other; it need not
+        keep any limit. The result starts and ends at rest.
+    space : PermissibleSpace
+        With its vehicle: a data sheet alone does not tell all limits.
+    obstacles : Obstacles, optional
+        The vehicle file must then have a footprint.
+    objective : {"time", "smooth", "change"}
+        The shortest duration; the least jerk in no more than the given duration; or
+        the smallest change of the poses with which all limits are kept, at whatever
+        speed: a permitted trajectory is then returned as it is.
+    bounds : (x0, y0, x1, y1) float, m, optional
+        The area that the footprint stays in.
+    clearance : float, m, ≥ 0
+        Least distance to obstacles and bounds.
+    keep_ends : bool
+        Whether start and goal stay; only ``change`` can do otherwise.
+    intervals : int, [8, 120]
+        Number of intervals of the splines on the longest way between two stops.
+    max_iterations : int, ≥ 1
+        Of the solver, each time it is asked.
+    time : float, s, > 0
+        About how long to try; proving the result comes on top.
+    tolerances : Tolerances, optional
+        What counts as standing and as free of slip.
+    allow_unreachable : bool
+        As of `validate`.
+
+    Returns
+    -------
+    Plan
+        Statistics: ``way`` (``solver``, ``timing``: the fastest timing of the given
+        path, or ``input``), ``objective``, ``before`` and ``after`` (what is optimised:
+        s, m²/s⁵ or m; ``before`` only if the input is permitted), ``iterations``,
+        ``solves``, ``solver`` (how it ended), ``unknowns``, ``constraints``,
+        ``solve_time`` s, ``time`` s, and ``largest_change`` m for ``change``.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is out of range, or the space does not know its vehicle.
+    InvalidTrajectory
+        If the samples are not poses or do not move.
+
+    References
+    ----------
+    spec/omni-curve §3 and §4 for the limits; J. Betts, Practical Methods for Optimal
+    Control Using Nonlinear Programming, chapter 4 (direct transcription).
+
+    Examples
+    --------
+    >>> import configspace, omniplan
+    >>> space = configspace.build_space(
+    ...     configspace.load_vehicle("mecanum"), cache=False)
+    >>> corner = omniplan.Path.from_poses([[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    >>> better = omniplan.optimise(corner, space)
+    >>> better.stops, better.duration < omniplan.fastest(corner, space).duration
+    (0, True)
+    """
+    began = clock.perf_counter()
+    given = _motion_of(motion)
+    task = _task(
+        given.name,
+        space,
+        obstacles,
+        objective,
+        bounds,
+        clearance,
+        keep_ends,
+        intervals,
+        max_iterations,
+        time,
+        tolerances or Tolerances(),
+        allow_unreachable,
+    )
+    return _Optimisation(task, given, began, time).run()
+
+
+def _motion_of(motion: Trajectory | Path | Plan) -> Trajectory | Path:
+    if isinstance(motion, Plan):
+        if motion.trajectory is None:
+            shown = f"a plan without a trajectory: {motion.status.value}"
+            allowed = "a plan that was found"
+            raise InvalidTrajectory(Problem("motion", shown, allowed))
+        return motion.trajectory
+    require_motion(motion, "motion")
+    return motion
+
+
+def _task(
+    name: str,
+    space: PermissibleSpace,
+    obstacles: Obstacles | None,
+    objective: Objective,
+    bounds: Sequence[float] | None,
+    clearance: float,
+    keep_ends: bool,
+    intervals: int,
+    max_iterations: int,
+    time: float,
+    tolerances: Tolerances,
+    allow_unreachable: bool,
+) -> Task:
+    """Return the task after a look at the arguments."""
+    require_space(space)
+    if space.vehicle is None:
+        given = f"{space.name}: a data sheet alone"
+        allowed = "optimising needs the vehicle: a data sheet does not hold all rates"
+        raise InvalidInput(Problem("space", given, allowed))
+    objectives = get_args(Objective)
+    _require(
+        objective in objectives, "objective", repr(objective), ", ".join(objectives)
+    )
+    _require(math.isfinite(time) and time > 0, "time", f"{time}", "positive, s")
+    _require(max_iterations >= 1, "max_iterations", f"{max_iterations}", "at least 1")
+    _require(8 <= intervals <= 120, "intervals", f"{intervals}", "from 8 to 120")
+    _require(
+        keep_ends or objective == "change",
+        "keep_ends",
+        f"False for the objective {objective}",
+        "only change may move the ends",
+    )
+    _require(
+        obstacles is None or isinstance(obstacles, Obstacles),
+        "obstacles",
+        type(obstacles).__name__,
+        "an Obstacles, as Obstacles.from_polygons returns",
+    )
+    checker, surroundings = None, None
+    if obstacles is not None or bounds is not None:
+        around = Obstacles() if obstacles is None else obstacles
+        checker = CollisionChecker(space.vehicle, around, clearance, bounds)
+        surroundings = Surroundings.of(space.vehicle, around)
+    box: Box | None = None
+    if bounds is not None:
+        x0, y0, x1, y1 = (float(x) for x in bounds)
+        box = x0, y0, x1, y1
+    return Task(
+        space,
+        space.vehicle,
+        rules_of(space.vehicle),
+        objective,
+        checker,
+        surroundings,
+        box,
+        clearance,
+        keep_ends,
+        intervals,
+        max_iterations,
+        tolerances,
+        allow_unreachable,
+        name,
+    )
+
+
+def _require(holds: bool, where: str, given: str, allowed: str) -> None:
+    if not holds:
+        raise InvalidInput(Problem(where, given, allowed))
+
+
+class _Optimisation:
+    """One run of `optimise`."""
+
+    def __init__(
+        self, task: Task, given: Trajectory | Path, began: float, time: float
+    ) -> None:
+        self._task, self._given = task, given
+        self._attempts = Attempts(task, deadline=began + time)
+        self._answers = Answers(task, self._attempts, began)
+        self._courses, self._waits = courses_of(
+            given, task.rules.reference, top_speed(task.rules)
+        )
+
+    def run(self) -> Plan:
+        blocked = self._blocked_end()
+        if blocked is not None:
+            return blocked
+        before = self._input()
+        if self._task.objective == "change" and before is not None:
+            return self._answers.found(before, before)
+        found = self._found(before)
+        options = [one for one in (before, found) if one is not None]
+        if not options:
+            return self._answers.refusal()
+        best = min(
+            options, key=lambda one: one.score * (1 + GAIN * (one is not before))
+        )
+        return self._answers.found(best, before)
+
+    def _blocked_end(self) -> Plan | None:
+        """Return why the start or the goal cannot be kept, None if both can."""
+        task = self._task
+        if task.checker is None or not task.keep_ends:
+            return None
+        ends = (self._courses[0].poses[0], self._courses[-1].poses[-1])
+        statuses = (PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED)
+        for pose, status in zip(ends, statuses, strict=True):
+            hit = task.checker.hit_at(pose)
+            if hit is not None:
+                message = (
+                    f"{task.name} by {task.space.name}: {status.value}: {hit.message}"
+                )
+                return self._answers.no(status, message, hit.pose)
+        return None
+
+    def _input(self) -> Candidate | None:
+        """Return the input as a candidate, None if it is no proved trajectory."""
+        task, given = self._task, self._given
+        if isinstance(given, Path):
+            return None
+        report = validate(
+            given,
+            task.space,
+            task.tolerances,
+            allow_unreachable=task.allow_unreachable,
+        )
+        hit = None
+        if task.checker is not None:
+            hit = task.checker.first_hit_of_trajectory(given)
+        realised = Realised(given, report, hit)
+        if not realised.is_proved:
+            self._attempts.refused = realised
+            return None
+        score = 0.0
+        if task.objective != "change":
+            score = self._attempts.rated(realised, None, None).score
+        return Candidate(realised, score, "input")
+
+    def _found(self, before: Candidate | None) -> Candidate | None:
+        """Return the best that timing and solving lead to."""
+        objective = self._task.objective
+        timed = self._timed()
+        if objective == "time":
+            return self._fastest(timed)
+        if objective == "change" and timed is not None:
+            return self._at_pace(timed)
+        courses, waits = self._courses, self._waits
+        longest = None
+        if objective == "smooth":
+            longest = sum(course.duration for course in courses) + sum(waits)
+            if isinstance(self._given, Path) and timed is not None:
+                longest = LONGER * timed.realised.trajectory.duration
+        return self._improved(courses, waits, longest=longest)
+
+    def _fastest(self, timed: Candidate | None) -> Candidate | None:
+        """Return the fastest: of the path as it is, or of one near it."""
+        courses, waits = self._courses, self._waits
+        if timed is not None:
+            courses, waits = self._courses_of(timed)
+        found = self._improved(courses, waits)
+        if found is not None and self._task.rules.bounds_swing:
+            # The solver has not been told of steering accelerations yet.
+            guess, signs = self._attempts.guess(*self._courses_of(found))
+            finer = self._attempts.improve(guess, signs, has_swing=True)
+            found = _better(found, finer)
+        return _better(timed, found)
+
+    def _timed(self) -> Candidate | None:
+        """Return the fastest timing of the path as it is given."""
+        task = self._task
+        realised = task.retimed(self._given)
+        if realised is None or not realised.is_proved:
+            return None
+        if task.objective == "change":
+            return Candidate(realised, 0.0, "timing")
+        return replace(self._attempts.rated(realised, None, None), way="timing")
+
+    def _at_pace(self, timed: Candidate) -> Candidate:
+        """Return the unchanged path at a pace as near to the given one as can be."""
+        options, duration = [timed.realised], 0.0
+        if isinstance(self._given, Trajectory):
+            duration = self._given.duration
+            slower = self._task.realised(self._given)
+            options += [slower] if slower.is_proved else []
+        return replace(timed, realised=self._attempts.at_pace(options, duration))
+
+    def _courses_of(self, candidate: Candidate) -> tuple[list[Course], list[float]]:
+        rules = self._task.rules
+        trajectory = candidate.realised.trajectory
+        return courses_of(trajectory, rules.reference, top_speed(rules))
+
+    def _improved(
+        self,
+        courses: Sequence[Course],
+        waits: Sequence[float],
+        *,
+        longest: float | None = None,
+    ) -> Candidate | None:
+        """Return what solving leads to: without stops that need not be, or with all."""
+        task, attempts = self._task, self._attempts
+        has_swing = task.rules.bounds_swing and task.objective != "time"
+        guess, signs = attempts.guess(courses, waits)
+        free = not task.rules.has_configuration and task.rules.line is None
+        groups = merged(courses, signs, turns_anywhere=free)
+        if task.objective != "change" and len(groups) < len(courses):
+            some = [rounded([courses[i] for i in group]) for group in groups]
+            between = [waits[group[-1]] for group in groups[:-1]]
+            chosen = tuple(signs[group[0]] for group in groups)
+            found = attempts.improve(
+                guess_of(some, between, task.intervals),
+                chosen,
+                longest=longest,
+                has_swing=has_swing,
+                share=FIRST,
+            )
+            if found is not None:
+                return found
+        return attempts.improve(guess, signs, longest=longest, has_swing=has_swing)
+
+
+def _better(one: Candidate | None, other: Candidate | None) -> Candidate | None:
+    """Return the better of two; the first where they hardly differ."""
+    if one is None or other is None:
+        return one or other
+    return other if other.score < one.score * (1 - GAIN) else one

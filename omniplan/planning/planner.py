@@ -1,0 +1,277 @@
+"""Planning: from pose to pose, such that the vehicle can drive it.
+
+The configuration of the wheels belongs to the state: a way is a chain of moves in which
+the wheels hold or follow their configuration, and where the next move needs another
+one the vehicle stops and steers, which takes its time.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from configspace import PermissibleSpace
+from omniplan.planning.blend import rounded_off
+from omniplan.planning.connect import Connector
+from omniplan.planning.finish import finished, steering_wait
+from omniplan.planning.improve import GAIN, moves_of, shortened
+from omniplan.planning.request import Request, checked_request, refusal
+from omniplan.planning.result import Plan, PlanStatus
+from omniplan.planning.route import Route
+from omniplan.planning.search import OPTIMISING, Found, direct, search
+from omniplan.planning.task import Task
+from omniplan.trajectory import Trajectory
+from omniplan.validation import validate
+
+__all__ = ["plan"]
+
+STANDING = 1e-3
+"""Duration of a plan from a pose to itself, s."""
+RESTARTS = 3
+"""So many searches in a row that find nothing quicker are enough."""
+PATIENCE = 2
+"""A search for a quicker way ends after so many times the motions asked before."""
+MOST_FINISHED = 3
+"""So many ways are timed and proved, the quickest first, until one is accepted."""
+
+Statistics = dict[str, float | int | str]
+
+
+def plan(
+    start: npt.ArrayLike,
+    goal: npt.ArrayLike,
+    space: PermissibleSpace,
+    obstacles: object = None,
+    *,
+    bounds: npt.ArrayLike | None = None,
+    clearance: float = 0.0,
+    planner: str = "RRTConnect",
+    time: float = 5.0,
+    seed: int = 1,
+    iterations: int | None = None,
+    method: Literal["geometric", "control"] = "geometric",
+) -> Plan:
+    """Return the quickest trajectory found from pose to pose, or why there is none.
+
+    A plan that is found has been accepted by `validate` and proved to meet nothing; it
+    starts and ends at rest. It is a chain of moves in which the wheels' configuration
+    is permitted throughout; between them the vehicle stands and steers.
+
+    Parameters
+    ----------
+    start, goal : (3,) or (5,) float, m, m, rad, 1, rad
+        (x, y, θ) of K in the world frame. (x, y, θ, κ_n, β) asks for a configuration of
+        the wheels as well: at rest they are turned from the one at the start, and to
+        the one at the goal. At κ_n = ±2 any β is the same.
+    space : PermissibleSpace
+        With its vehicle: timing needs limits that a data sheet does not tell.
+    obstacles : Obstacles or CollisionChecker, optional
+        By default nothing stands in the way. A checker brings its own clearance and
+        bounds.
+    bounds : (4,) float, m, optional
+        (x0, y0, x1, y1): the footprint stays inside. By default poses are looked for
+        around start, goal and obstacles.
+    clearance : float, m, ≥ 0
+        Distance to keep from obstacles and bounds.
+    planner : str
+        Of OMPL: ``RRTConnect`` (a first way soon, then short cuts and new searches),
+        ``RRT``, ``KPIECE1``, ``BKPIECE1``, ``LBKPIECE1``; ``RRTstar``,
+        ``InformedRRTstar``, ``BITstar`` and ``FMT`` minimise the travel time.
+    time : float, s, > 0
+        For the search; timing and proof come on top. It ends earlier once several
+        searches in a row have found nothing quicker.
+    seed : int, [1, 2**31)
+    iterations : int, > 0, optional
+        So many motions are checked for collisions at most: with enough time the same
+        seed gives the same plan.
+    method : {"geometric", "control"}
+        Chains of moves, or motions with the rates of (κ_n, β, v_s) as controls.
+
+    Returns
+    -------
+    Plan
+        With the statistics ``planner``, ``seed``, ``time_to_first`` (until a way was
+        known, proved permitted and free), ``time`` (all), ``iterations`` and
+        ``searches``.
+
+    Raises
+    ------
+    InvalidInput
+        For values that make no sense; obstacles in the way are no error.
+
+    References
+    ----------
+    spec/omni-curve §1, §5; J. Kuffner, S. LaValle, RRT-Connect, ICRA 2000.
+
+    Examples
+    --------
+    >>> import configspace, omniplan
+    >>> space = configspace.build_space(
+    ...     configspace.load_vehicle("mecanum"), cache=False)
+    >>> found = omniplan.plan([0, 0, 0], [2, 1, 0], space)
+    >>> found.status.name, found.stops
+    ('FOUND', 0)
+    """
+    request = checked_request(
+        start,
+        goal,
+        space,
+        obstacles,
+        bounds=bounds,
+        clearance=clearance,
+        planner=planner,
+        time=time,
+        seed=seed,
+        iterations=iterations,
+        method=method,
+    )
+    no = refusal(request)
+    if no is not None:
+        return no
+    if request.is_at_goal:
+        return _standing(request)
+    if method == "control":
+        return _controlled(request)
+    return _geometric(request)
+
+
+def _geometric(request: Request) -> Plan:
+    task = request.task
+    ways, searches = _ways(task, request.connector)
+    statistics: Statistics = {**request.statistics, "searches": searches}
+    if not ways:
+        return _nothing(request, statistics)
+    statistics["time_to_first"] = min(found.at for found in ways)
+    plans: list[Plan] = []
+    for route in _routes(task, request.connector, ways):
+        plan = finished(task, request.ends, request.strict, route, statistics)
+        spent = {**plan.statistics, **_spent(task)}
+        plans.append(replace(plan, statistics=spent))
+        if plan.is_found:
+            break
+    return plans[-1] if plans[-1].is_found else plans[0]
+
+
+def _routes(task: Task, connector: Connector, ways: list[Found]) -> Iterator[Route]:
+    """Yield routes to try, the one that is hoped to be quickest first."""
+    routes = [Route.from_moves(moves_of(way.chain)) for way in ways[:MOST_FINISHED]]
+    rounded = [rounded_off(task, connector.permits, route) for route in routes]
+    for route, _ in sorted(rounded, key=operator.itemgetter(1)):
+        yield route
+    for (route, _), plain in zip(rounded, routes, strict=True):
+        if len(plain.stops) > len(route.stops):
+            yield plain
+
+
+def _ways(task: Task, connector: Connector) -> tuple[list[Found], int]:
+    """Return ways to the goal, the quickest one first, and the number of searches."""
+    random = np.random.default_rng(task.seed)
+    first = direct(task, connector)
+    ways = [] if first is None else [first]
+    searches, stale = 0, 0
+    if not _is_enough(task, ways) and first is not None:
+        _improve(task, connector, ways, first, random)
+    while not _is_enough(task, ways) and stale < RESTARTS:
+        searches += 1
+        most = None if not ways else PATIENCE * task.budget.asked
+        best = _quickest(ways)
+        found = search(task, connector, task.seed + searches, most)
+        if found is not None:
+            ways.append(found)
+            task.budget.has_way = True
+            _improve(task, connector, ways, found, random)
+        stale = 0 if _quickest(ways) < best - GAIN else stale + 1
+        if task.planner in OPTIMISING and found is not None:
+            break
+    return sorted(ways, key=lambda way: way.duration), searches
+
+
+def _improve(
+    task: Task,
+    connector: Connector,
+    ways: list[Found],
+    found: Found,
+    random: np.random.Generator,
+) -> None:
+    better = shortened(task, connector, found, random)
+    if better.duration < found.duration:
+        ways.append(better)
+
+
+def _quickest(ways: list[Found]) -> float:
+    return min((way.duration for way in ways), default=math.inf)
+
+
+def _is_enough(task: Task, ways: list[Found]) -> bool:
+    """Return whether the search must end, or one move leads to the goal."""
+    task.budget.has_way = bool(ways)
+    if task.budget.is_enclosed:
+        return True
+    return task.is_over() or any(len(way.chain) == 1 for way in ways)
+
+
+def _controlled(request: Request) -> Plan:
+    from omniplan.planning import controls
+
+    task = request.task
+    found = controls.search(task, request.connector)
+    statistics = {**request.statistics, **_spent(task)}
+    if found is None:
+        return _nothing(request, statistics)
+    route, statistics["time_to_first"] = found
+    return finished(task, request.ends, request.strict, route, statistics)
+
+
+def _spent(task: Task) -> dict[str, float | int | str]:
+    return {"time": task.budget.elapsed, "iterations": task.budget.asked}
+
+
+def _nothing(request: Request, statistics: Statistics) -> Plan:
+    task = request.task
+    if task.budget.is_enclosed is None:
+        task.budget.is_enclosed = task.is_enclosed()
+    if task.budget.is_enclosed:
+        name, unreachable = task.space.name, PlanStatus.UNREACHABLE
+        message = (
+            f"{name}: {unreachable.value}: obstacles or bounds part the goal from the "
+            "start: not even the largest disc about K inside the footprint gets through"
+        )
+        spent = {**statistics, **_spent(task)}
+        return Plan(name, unreachable, message, place=task.goal, statistics=spent)
+    message = (
+        f"{task.space.name}: no way was found in {task.budget.elapsed:.1f} s "
+        f"and {task.budget.asked} motions; there may be one"
+    )
+    spent = {**statistics, **_spent(task)}
+    return Plan(task.space.name, PlanStatus.TIMEOUT, message, statistics=spent)
+
+
+def _standing(request: Request) -> Plan:
+    """Return the plan from a pose to itself: the wheels turn, if at all."""
+    task, ends = request.task, request.ends
+    wait = 0.0
+    if ends.start is not None and ends.goal is not None:
+        wait = steering_wait(task, ends.start, ends.goal)
+    name = task.space.name
+    statistics = {**request.statistics, **_spent(task)}
+    if math.isinf(wait):
+        message = f"{name}: at rest the wheels find no way to the configuration asked"
+        status = PlanStatus.NOT_PROVED
+        return Plan(name, status, message, place=task.start, statistics=statistics)
+    reference = task.vehicle.reference
+    trajectory = Trajectory.from_poses(
+        [0.0, max(wait * (1 + 1e-6), STANDING)],
+        [task.start, task.start],
+        name="plan",
+        reference_point=(reference.real, reference.imag),
+    )
+    report = validate(trajectory, task.space)
+    message = f"{name}: it stands at the goal already, its wheels turn in {wait:.2f} s"
+    found = PlanStatus.FOUND
+    return Plan(name, found, message, trajectory, report, statistics=statistics)

@@ -1,0 +1,184 @@
+"""Pictures of plans: the way among obstacles, what is swept, and the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch, Polygon
+from matplotlib.path import Path
+
+from configspace.plot_style import new_figure
+from omniplan.motion import stops_of
+from omniplan.plots.plan_data import film_of, spread_along
+from omniplan.plots.style import BROKEN, GOAL, PATH, START, plain
+from omniplan.scenarios.solving import Solution
+
+__all__ = ["draw_scene", "numbers_of", "panels", "plot_plans"]
+
+FloatArray = npt.NDArray[np.float64]
+Bounds = tuple[float, float, float, float]
+
+SWEPT = "#cfe3f2"
+OBSTACLE = "0.35"
+FOOTPRINT_STEP = 0.3
+"""Between two outlines no corner moves much farther than this share of the vehicle."""
+
+
+def plot_plans(solutions: Sequence[Solution], title: str = "") -> Figure:
+    """Draw plans side by side, in one scale.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        At least one; plans that were not found are drawn without a way.
+    title : str
+    """
+    figure, axes = panels(solutions, title)
+    for each, solution in zip(axes, solutions, strict=True):
+        draw_scene(each, solution)
+        _draw_way(each, solution)
+        each.set_xlabel(numbers_of(solution), fontsize="medium")
+    figure.legend(
+        handles=_keys(solutions),
+        loc="outside lower center",
+        ncols=5,
+        frameon=False,
+        fontsize="small",
+    )
+    return figure
+
+
+def panels(
+    solutions: Sequence[Solution],
+    title: str,
+    width: float = 4.2,
+    below: float = 0.35,
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one panel per plan, and the panels.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    title : str
+    width : float
+        Of a panel, inches.
+    below : float
+        Room for a legend, inches.
+    """
+    x0, y0, x1, y1 = _common(solutions)
+    n = len(solutions)
+    columns = n if (y1 - y0) > 0.45 * (x1 - x0) or n == 1 else 1
+    rows = -(-n // columns)
+    wide = width if columns > 1 else 1.6 * width
+    tall = wide * (y1 - y0) / (x1 - x0) + 0.5
+    figure = new_figure(wide * columns, tall * rows + below + (0.35 if title else 0.0))
+    if title:
+        figure.suptitle(plain(title, 100), fontweight="bold")
+    axes = [figure.add_subplot(rows, columns, i + 1) for i in range(n)]
+    for each, solution in zip(axes, solutions, strict=True):
+        each.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
+        each.set_xticks([])
+        each.set_yticks([])
+        each.set_title(
+            plain(solution.title[:1].upper() + solution.title[1:]), fontsize="medium"
+        )
+    return figure, axes
+
+
+def draw_scene(axes: Axes, solution: Solution) -> None:
+    """Draw what stands in the hall."""
+    for rings in solution.obstacles.rings():
+        axes.add_patch(
+            PathPatch(_path(rings), fc=OBSTACLE, ec="black", lw=0.6, zorder=2)
+        )
+
+
+def numbers_of(solution: Solution) -> str:
+    """Return swept area, time, cusps and stops of a plan, or why there is none."""
+    plan = solution.plan
+    if plan.trajectory is None:
+        return f"no plan: {plan.status.value}"
+    cusps = "1 cusp" if plan.cusps == 1 else f"{plan.cusps} cusps"
+    stops = "1 stop" if plan.stops == 1 else f"{plan.stops} stops"
+    area = solution.swept_area
+    return f"{area:.2f} m² swept · {plan.duration:.1f} s · {cusps} · {stops}"
+
+
+def _draw_way(axes: Axes, solution: Solution) -> None:
+    trajectory, swept = solution.plan.trajectory, solution.swept
+    if trajectory is None or swept is None:
+        return
+    axes.add_patch(PathPatch(_path(swept.rings), fc=SWEPT, ec="none", zorder=1))
+    film = film_of(trajectory, solution.space)
+    size = float(np.ptp(film.outlines[0], axis=0).max())
+    chosen = spread_along(film, FOOTPRINT_STEP * size)[1:-1]
+    axes.add_collection(
+        PolyCollection(
+            list(film.outlines[chosen]), fc="none", ec="0.45", lw=0.6, zorder=3
+        )
+    )
+    for index, colour, style in ((0, START, "-"), (-1, GOAL, "-")):
+        axes.add_patch(
+            Polygon(
+                film.outlines[index], fc="none", ec=colour, lw=2, ls=style, zorder=5
+            )
+        )
+        axes.add_collection(
+            PolyCollection(list(film.wheels[index]), fc=colour, ec="none", zorder=4)
+        )
+    axes.plot(*film.k.T, color=PATH, lw=1.4, zorder=6)
+    stands = _standstills(solution)
+    axes.plot(*stands.T, "o", ms=5, color="white", mec=BROKEN, mew=1.5, zorder=7)
+
+
+def _standstills(solution: Solution) -> FloatArray:
+    """Return where K stands on the way, (n, 2) m."""
+    trajectory = solution.plan.trajectory
+    assert trajectory is not None
+    samples = trajectory.samples
+    stands = stops_of(samples)
+    stands[:2] = stands[-2:] = False
+    inner = samples[stands, :2]
+    far = np.linalg.norm(inner - samples[0, :2], axis=1) > 1e-6
+    far &= np.linalg.norm(inner - samples[-1, :2], axis=1) > 1e-6
+    return np.asarray(inner[far])
+
+
+def _keys(solutions: Sequence[Solution]) -> list[Artist]:
+    keys: list[Artist] = [
+        Patch(fc="none", ec=START, lw=2, label="start"),
+        Patch(fc="none", ec=GOAL, lw=2, label="goal"),
+        Patch(fc=SWEPT, ec="none", label="swept area"),
+        Line2D([], [], color=PATH, lw=1.4, label="path of K"),
+    ]
+    look = {"marker": "o", "ls": "none", "mfc": "white", "mec": BROKEN, "mew": 1.5}
+    if any(solution.plan.stops for solution in solutions):
+        keys.append(Line2D([], [], label="stop", **look))  # type: ignore[arg-type]
+    return keys
+
+
+def _common(solutions: Sequence[Solution]) -> Bounds:
+    """Return a box around all that is shown."""
+    boxes = []
+    for solution in solutions:
+        if solution.obstacles.bounds is not None:
+            boxes.append(solution.obstacles.bounds)
+        if solution.swept is not None:
+            boxes.append(solution.swept.bounds)
+    if not boxes:
+        return (-1.0, -1.0, 1.0, 1.0)
+    x0, y0, _, _ = np.min(boxes, axis=0).tolist()
+    _, _, x1, y1 = np.max(boxes, axis=0).tolist()
+    margin = 0.02 * max(x1 - x0, y1 - y0)
+    return x0 - margin, y0 - margin, x1 + margin, y1 + margin
+
+
+def _path(rings: Sequence[FloatArray]) -> Path:
+    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))

@@ -1,0 +1,142 @@
+"""``omniplan plan`` as its user sees it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from omniplan import cli, read_trajectories
+
+Capture = pytest.CaptureFixture[str]
+WALL = {"wall": [[1, -9], [1.2, -9], [1.2, 0.8], [1, 0.8]]}
+
+
+def answer(capsys: Capture, *arguments: str) -> tuple[int, dict[str, object]]:
+    code = cli.main(["plan", *arguments, "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_a_plan_is_found_written_and_drawn(capsys: Capture, tmp_path: Path) -> None:
+    hall, out = tmp_path / "hall.json", tmp_path / "way.csv"
+    hall.write_text(json.dumps(WALL))
+    words = (
+        "plan --vehicle mecanum --start -0.5,0,0 --goal 2.5,0,90 --bounds=-2,-2,4,4 "
+        f"--obstacles {hall} --clearance 0.05 --time 0.5 --out {out} "
+        f"--plot {tmp_path / 'pictures'}"
+    )
+    code = cli.main(words.split())
+    said = capsys.readouterr().out
+    assert code == 0
+    assert "mecanum: " in said
+    assert "swept area" in said
+    (trajectory,) = read_trajectories(out)
+    ends = trajectory.samples[[0, -1]]  # type: ignore[union-attr]
+    expected = np.array([[-0.5, 0, 0], [2.5, 0, np.pi / 2]])
+    assert ends == pytest.approx(expected, abs=1e-6)
+    names = {path.name for path in (tmp_path / "pictures").iterdir()}
+    assert "plan-mecanum.png" in names
+    assert len(names) > 1
+
+
+def test_json_holds_plan_and_area(capsys: Capture) -> None:
+    arguments = ["--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0"]
+    code, found = answer(capsys, *arguments)
+    assert code == 0
+    assert found["swept_area"] == pytest.approx(0.9 * 0.64 + 0.64, abs=1e-6)
+    plan = found["plan"]
+    assert isinstance(plan, dict)
+    assert plan["status"] == "found"
+
+
+def test_a_blocked_goal_is_a_no(capsys: Capture, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((20, 20), dtype=np.uint8)).save(tmp_path / "map.png")
+    (tmp_path / "map.yaml").write_text(
+        "{image: map.png, resolution: 0.05, origin: [2, -0.5, 0], negate: 0, "
+        "occupied_thresh: 0.65, free_thresh: 0.196}"
+    )
+    arguments = ["--vehicle", "mecanum", "--start", "0,0,0", "--goal", "2.5,0,0"]
+    code, found = answer(capsys, *arguments, "--map", str(tmp_path / "map.yaml"))
+    assert code == 1
+    plan = found["plan"]
+    assert isinstance(plan, dict)
+    assert plan["status"] == "goal blocked"
+    assert "map.yaml near" in str(plan["message"])
+    assert found["swept_area"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "3 problems"),
+        (["--vehicle", "mecanum", "--start", "0,0,0"], "--goal: missing"),
+        (["--scenario", "parcing"], "did you mean parking"),
+        (["--scenario", "parking", "--vehicle", "mecanum"], "--vehicle: given with"),
+        (
+            ["--vehicle", "mecanum", "--start", "0,0", "--goal", "1,0,0"],
+            "--start: 0,0;",
+        ),
+        (["--vehicle", "mecanum", "--start", "0,0,x", "--goal", "1,0,0"], "X,Y,DEG"),
+        (["--vehicle", "mecanum", "--start", "0,0,nan", "--goal", "1,0,0"], "--start"),
+        (
+            ["--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0", "--bounds=1,2,3"],
+            "--bounds: 1,2,3; X0,Y0,X1,Y1",
+        ),
+        (
+            ["--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0", "--out=a.txt"],
+            "--out: a.txt; must end in .csv",
+        ),
+        (
+            ["--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0", "--time", "0"],
+            "time",
+        ),
+        (
+            [
+                "--vehicle",
+                "mecanum",
+                "--start=0,0,0",
+                "--goal=1,0,0",
+                "--map",
+                "no.yaml",
+            ],
+            "map no.yaml",
+        ),
+    ],
+)
+def test_bad_input_is_told(capsys: Capture, arguments: list[str], words: str) -> None:
+    assert cli.main(["plan", *arguments]) == 2
+    told = capsys.readouterr().err
+    assert words in told or words == "3 problems"
+    if words == "3 problems":
+        assert all(
+            f"--{name}: missing" in told for name in ("vehicle", "start", "goal")
+        )
+
+
+def test_a_scenario_writes_its_folder(capsys: Capture, tmp_path: Path) -> None:
+    code, found = answer(capsys, "--scenario", "pillar", "--out", str(tmp_path / "out"))
+    assert code == 0
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["pillar-platform-synchro.csv", "pillar.gif", "pillar.png"]
+    assert (tmp_path / "out" / "pillar.gif").stat().st_size < 1_000_000
+    solutions = found["solutions"]
+    assert isinstance(solutions, list)
+    (solution,) = solutions
+    assert solution["vehicle"] == "platform-synchro"
+    assert solution["swept_area"] > 3
+
+
+def test_a_scenario_prints_a_table(capsys: Capture) -> None:
+    assert cli.main(["plan", "--scenario", "pillar"]) == 0
+    said = capsys.readouterr().out
+    assert "Around a pillar" in said
+    assert "synchro drive" in said
+    assert "m²" in said
+
+
+def test_too_little_time_is_a_no(capsys: Capture) -> None:
+    assert cli.main(["plan", "--scenario", "pillar", "--time", "1e-9"]) == 1
+    assert "no way was found" in capsys.readouterr().out

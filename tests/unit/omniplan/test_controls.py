@@ -1,0 +1,179 @@
+"""Planning with rates of the configuration as controls."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import configspace
+import omniplan
+from configspace import PermissibleSpace
+from configspace.omni_curve import to_twist
+from omniplan.obstacles import CollisionChecker, Obstacles
+from omniplan.planning import controls
+from omniplan.planning.control_kernels import LEVELS, STEPS, drive
+from omniplan.sampling.intervals import PermittedIntervals
+
+FloatArray = npt.NDArray[np.float64]
+
+NAMES = ("ackermann", "mecanum", "four-wheel-steering", "differential")
+FINE = 0.01
+HALL = (0.0, 0.0, 12.0, 8.0)
+WALL = [(5.8, 0.0), (6.2, 0.0), (6.2, 4.5), (5.8, 4.5)]
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def space(request: pytest.FixtureRequest) -> PermissibleSpace:
+    return configspace.build_space(configspace.load_vehicle(request.param))
+
+
+def _driven(
+    space: PermissibleSpace, start: tuple[float, ...], given: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    states = np.empty((len(given), STEPS + 1, 5))
+    ends = np.empty((len(given), 2))
+    drive(
+        PermittedIntervals(space).table,
+        space.tables.load,
+        *controls._rate_tables(space),
+        space.line_beta is not None,
+        space.kappa_g,
+        FINE,
+        np.array(start),
+        given,
+        states,
+        ends,
+    )
+    return states, ends
+
+
+def _random_controls(rng: np.random.Generator, count: int) -> FloatArray:
+    shares = rng.uniform(-1, 1, (count, 2)) * 0.5
+    level = rng.integers(1, len(LEVELS) + 1, count) * rng.choice([-1, 1], count)
+    return np.column_stack([shares, level, rng.uniform(0.05, 1.0, count)])
+
+
+def test_controls_drive_as_the_twist_says(space: PermissibleSpace) -> None:
+    rng = np.random.default_rng(1)
+    given = _random_controls(rng, 30)
+    line = space.line_beta or 0.0
+    states, ends = _driven(space, (1.0, 2.0, 0.5, 0.1, line), given)
+    assert (ends[:, 0] > 0).sum() > 10
+    for control, path, (_, steps) in zip(given, states, ends, strict=True):
+        sign = math.copysign(1.0, control[2])
+        step = sign * control[3] / STEPS
+        pose = np.array([1.0, 2.0, 0.5])
+        # A plain loop in 200 small steps per step, without arcs.
+        for a, b in itertools.pairwise(path[: int(steps) + 1]):
+            shares = (np.arange(60) + 0.5) / 60
+            change = a[3:] + shares[:, None] * (b[3:] - a[3:])
+            twists = to_twist(change[:, 0], change[:, 1], step / 60, space.kappa_g)
+            for vx, vy, omega in twists:
+                moved = complex(vx, vy) * np.exp(1j * (pose[2] + omega / 2))
+                pose += [moved.real, moved.imag, omega]
+            np.testing.assert_allclose(b[:3], pose, atol=2e-5)
+
+
+def test_what_is_driven_is_permitted_and_within_the_rates(
+    space: PermissibleSpace,
+) -> None:
+    rng = np.random.default_rng(2)
+    given = _random_controls(rng, 200)
+    line = space.line_beta or 0.0
+    states, ends = _driven(space, (0.0, 0.0, 0.0, 0.4, line), given)
+    kappa_rates, beta_rates = controls._rate_tables(space)
+    permitted = ends[:, 0] > 0
+    assert permitted.any()
+    for control, path, (time, _) in zip(
+        given[permitted], states[permitted], ends[permitted], strict=True
+    ):
+        assert (space.v_max(path[:, 3], path[:, 4], reachable_only=True) > 0).all()
+        change = np.abs(path[-1, 3:] - path[0, 3:])
+        assert change[0] <= abs(control[0]) * kappa_rates.max() * time + 1e-12
+        assert change[1] <= abs(control[1]) * beta_rates.max() * time + 1e-12
+        # v_n v_max is driven, or a little less.
+        fastest = space.v_max(path[:, 3], path[:, 4]).max()
+        assert time >= control[3] / (fastest * LEVELS[int(abs(control[2])) - 1]) / 1.001
+
+
+def test_controls_that_leave_what_is_permitted_end() -> None:
+    space = configspace.build_space(configspace.load_vehicle("four-wheel-steering"))
+    given = np.array([[0.0, 1.0, 3.0, 5.0], [0.0, 0.0, 3.0, 5.0]])
+    states, ends = _driven(space, (0.0, 0.0, 0.0, 0.0, 0.3), given)
+    assert ends[0, 0] < 0
+    assert ends[0, 1] < STEPS
+    last = states[0, int(ends[0, 1]), 4]
+    assert 0.3 < last <= math.radians(40)
+    assert ends[1, 0] > 0
+    straight = 5.0 * np.array([math.cos(0.3), math.sin(0.3)])
+    np.testing.assert_allclose(states[1, -1, :2], straight, atol=1e-9)
+
+
+def test_a_plan_by_controls_is_driven_around_a_wall(space: PermissibleSpace) -> None:
+    wall = Obstacles.from_polygons({"wall": WALL})
+    start, goal = (2.0, 2.0, 0.0), (10.0, 3.0, 0.5)
+    plan = omniplan.plan(
+        start, goal, space, wall, bounds=HALL, time=30.0, seed=2, method="control"
+    )
+    assert plan.is_found, plan.message
+    trajectory = plan.raise_for_status()
+    assert omniplan.validate(trajectory, space).valid
+    checker = CollisionChecker(space, wall, bounds=HALL)
+    assert checker.first_hit_of_trajectory(trajectory) is None
+    poses = trajectory.samples
+    np.testing.assert_allclose(poses[0], start, atol=1e-9)
+    end = poses[-1] - np.array(goal)
+    end[2] = math.remainder(end[2], 2 * math.pi)
+    np.testing.assert_allclose(end, 0, atol=1e-9)
+    assert plan.statistics["planner"] == "control"
+
+
+def test_a_blocked_goal_is_out_of_reach_in_time() -> None:
+    space = configspace.build_space(configspace.load_vehicle("mecanum"))
+    wall = Obstacles.from_polygons([[(5.8, 0), (6.2, 0), (6.2, 8), (5.8, 8)]])
+    plan = omniplan.plan(
+        (2, 2, 0), (10, 3, 0), space, wall, bounds=HALL, time=0.5, method="control"
+    )
+    assert not plan.is_found
+    assert plan.trajectory is None
+
+
+def test_kpiece_explores_as_well() -> None:
+    space = configspace.build_space(configspace.load_vehicle("mecanum"))
+    wall = Obstacles.from_polygons([WALL])
+    plan = omniplan.plan(
+        (2, 2, 0),
+        (10, 3, 0.5),
+        space,
+        wall,
+        bounds=HALL,
+        time=30.0,
+        planner="KPIECE1",
+        method="control",
+    )
+    assert plan.is_found, plan.message
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_plan() -> None:
+    space = configspace.build_space(configspace.load_vehicle("mecanum"))
+    wall = Obstacles.from_polygons([WALL])
+
+    def duration(seed: int) -> float | None:
+        return omniplan.plan(
+            (2, 2, 0),
+            (10, 3, 0.5),
+            space,
+            wall,
+            bounds=HALL,
+            time=60.0,
+            seed=seed,
+            method="control",
+        ).duration
+
+    assert duration(5) == duration(5)
+    assert duration(5) != duration(6)
