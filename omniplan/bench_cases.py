@@ -36,7 +36,7 @@ FINE = 2001
 def random_vehicles(rng: np.random.Generator, count: int) -> list[Vehicle]:
     """Return vehicles of `KINDS` in turn, each with its own size and speeds.
 
-    Without limits on the steering acceleration, which the kernels leave to `validate`.
+    Without limits on the steering acceleration, so that figures stay comparable.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def _varied(rng: np.random.Generator, data: dict[str, Any], number: int) -> Vehi
     wheels = []
     for wheel in data["wheels"]:
         wheel = {**wheel, "x": wheel["x"] * size, "y": wheel["y"] * size}
-        wheel.pop("max_steering_acceleration_deg", None)  # not for the kernels
+        wheel.pop("max_steering_acceleration_deg", None)
         for key, factor in (("max_speed", speed), ("max_acceleration", gain)):
             if key in wheel:
                 wheel[key] *= factor

@@ -106,7 +106,9 @@ def validate_many(
             As ``validate(trajectory, space).valid``.
         ``margin``
             1 - the largest utilisation of any limit: of a valid pair never exceeded and
-            sharp to a thousandth as in a `Report`; of a refused one, reached.
+            sharp to a thousandth as in a `Report`; of a refused one, reached. Where a
+            standstill sets it, the time there is counts from where the vehicle surely
+            stands, which may be some hundredths of a second less than in a `Report`.
         ``duration``
             s.
         ``limit``, ``wheel``

@@ -46,7 +46,7 @@ PAD = 2e-3
 time to time, m; the exact check comes after."""
 STRICTER = 3.0
 """Factor on such margins from round to round."""
-REACH = 0.6
+REACH = 1.5
 """How near an obstacle is when it is looked at from the beginning, m."""
 WORTH_A_LOOK = 0.3
 """Limits broken by more than this share are not worth proving."""
@@ -219,7 +219,15 @@ class Attempts:
             if candidate is not None:
                 return candidate
             tightness, pad = self._stricter(tightness, pad)
-            guess = found
+            assert self.refused is not None
+            if self.refused.hit is None or task.surroundings is None:
+                guess = found
+            else:
+                # From the start again, with what turned out to be near: a line through
+                # an obstacle tells no side.
+                known, _ = task.surroundings.separations(
+                    found, REACH, 0.0, known, keep_ends=False
+                )
         return None
 
     def _solve(

@@ -66,7 +66,7 @@ def words(x: float, y: float, phi: float) -> tuple[IntArray, FloatArray]:
     --------
     >>> turns, lengths = words(2.0, 2.0, math.pi / 2)
     >>> float(abs(lengths[0]).sum().round(4))
-    3.5708
+    2.985
     """
     turns = np.empty((_MAX_WORDS, 5), dtype=np.int64)
     lengths = np.empty((_MAX_WORDS, 5))
