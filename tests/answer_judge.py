@@ -16,9 +16,15 @@ from odd_requests import Question
 import configspace
 import omniplan
 from omniplan.batch.many import SCHEMA
-from services.protocol.batch_messages import BatchPart
 from services.errors import CODES
-from services.protocol.messages import ErrorReply, SelectReply, ValidateReply, decode, encode
+from services.protocol.batch_messages import BatchPart
+from services.protocol.messages import (
+    ErrorReply,
+    SelectReply,
+    ValidateReply,
+    decode,
+    encode,
+)
 from services.registering.registry_messages import RegisterReply
 from services.wire.exchange import Reply
 

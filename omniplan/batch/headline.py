@@ -81,27 +81,34 @@ def _keep_largest(
 def _at_samples(
     blocks: Array, knot_of: Array, samples: tuple[Array, ...], rows: Array, r: int,
     vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
-    begin: float, end: float, best: float, place: Array,
+    begin: float, end: float, best: float, floor: float, place: Array,
 ) -> float:  # fmt: skip
     """Largest utilisation of a row at the samples; 0 if none breaks the limit.
 
-    Only in the intervals whose middle is between two times, and if it is more than
-    `best`. `place` gets knot, start and end of the first of the intervals.
+    Only in the intervals whose middle is between two times, if it is more than `best`,
+    and where it may be more than `floor`. `place` gets knot, start and end of the first
+    of the intervals.
     """
     plain, wholes, whole_knot = samples
     count, wide = blocks.shape[0], is_wide(rows[r, KIND])
     error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    floor, others = max(KEPT, floor), 0.0
     for b in range(count):
         bound = skipped[r * count + b]
         most = bound if bound >= 0.0 else largest(highs, (r * count + b) * LANES)
-        if not plain[b] or most + error <= max(KEPT, best * (1 - TIE)):
+        if not plain[b]:
+            others = max(others, most)
+            continue
+        if most + error <= max(floor, best * (1 - TIE)):
             continue
         load(blocks, b, s)
         if wide:
             load_swings(blocks, b, s)
         one_row(s, rows, r, vehicle, tolerances, YES)
         best = _keep_largest(s, knot_of, b, begin, end, best, place)
-    for b in range(wholes.shape[0]):
+    # What the intervals of other blocks reach, their parts do not exceed.
+    is_less = others + error <= max(floor, best * (1 - TIE))
+    for b in range(0 if is_less else wholes.shape[0]):
         load(wholes, b, s)
         if wide:
             load_swings(wholes, b, s)
@@ -158,6 +165,8 @@ def headline(
             error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
             if order[r, 0] != c or high[r] + error <= KEPT:
                 continue
+            is_slip = rows[r, KIND] == SLIP or rows[r, KIND] == PARALLEL
+            floor = 0.0 if is_slip or c == 0 else most * (1 - 2 * TIE)
             sign, best = rows[r, SIGN], 0.0
             for p in range(pieces if sign != 0 else 1):
                 if sign != 0 and not is_driven(sign, pieces, signs, steers, p):
@@ -167,7 +176,7 @@ def headline(
                     begin, end = _window(blocks, ends, pieces, p)
                 best = _at_samples(
                     blocks, knot_of, samples, rows, r, vehicle, tolerances, s, highs,
-                    skipped, begin, end, best, spot,
+                    skipped, begin, end, best, floor, spot,
                 )  # fmt: skip
             ratio = told(rows, r, best)
             is_open |= best <= KEPT

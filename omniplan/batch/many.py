@@ -112,12 +112,12 @@ def validate_many(
         ``duration``
             s.
         ``limit``, ``wheel``
-            What refuses the pair, as the headline of its `Report`; among limits that
-            are broken alike another one of them may be named. Of a valid pair what the
-            margin belongs to. Null where nothing limits it, or no wheel does.
+            What refuses the pair, as the headline of its `Report`. Of a valid pair what
+            the margin belongs to. Null where nothing limits it, or no wheel does.
         ``t``, ``value``, ``bound``, ``unit``
-            Of a refused pair where the limit is broken, s, and by how much. Where the
-            worst is between two samples, the value may fall a little short of it.
+            Of a refused pair the sample, s, at which the limit is broken most, and by
+            how much. The headline of a `Report` may have a worse place between two
+            samples in the same stretch.
 
         The metadata count the pairs (``omniplan.pairs``) and those that `validate`
         was asked for (``omniplan.asked``).

@@ -43,7 +43,7 @@ def _rest(
 
     The interval is halved towards the rest until the vehicle is taken to stand over
     what is left. `out` gets that time and the most that it may be off by, if the parts
-    of `validate` are cut finer there; then the velocity of K and ω. Returns whether
+    of `validate` are cut finer there, infinite if not known; then the velocity of K and ω. Returns whether
     this is known.
     """
     view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
@@ -76,7 +76,8 @@ def _rest(
     while True:
         far *= 2
         if far > end - start:
-            return False
+            out[1] = math.inf
+            return True
         t = end - far if at_end else start + far
         for k in range(LANES):
             enclose(knot, form, t, t, view, k)

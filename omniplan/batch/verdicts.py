@@ -333,6 +333,7 @@ def _refusal(
     place: Array, ends: Array, pieces: int, by_piece: Array, signs: Array, out: Array,
 ) -> int:  # fmt: skip
     """Write what refuses a pair and the margin; return the row of `headline`."""
+    which: int
     which, worst = headline(
         blocks, knot_of, count, knots, form, samples, rows, order, vehicle, tolerances,
         s, highs, skipped, halves, stack, knot_at, high, place, ends, pieces, signs,

@@ -43,6 +43,8 @@ UNHURRIED = 0.3
 """Share of the slowest speed limit at which a path without times is thought driven."""
 LEAST, MOST = 8, 120
 """Numbers of intervals of a leg."""
+TOGETHER = 3
+"""So many times the number of intervals of the longest leg all may have."""
 ROUND = 0.15
 """Share of the time of a leg by which a corner without a stop is rounded."""
 CUSP = math.radians(120)
@@ -232,9 +234,11 @@ def guess_of(
     courses : sequence of Course
     waits : sequence of float, s
     intervals : int
-        Of the longest course; the others have fewer.
+        Of the longest course; the others have fewer, and all together at most
+        `TOGETHER` times as many, but for `LEAST` of each.
     """
-    longest = max(course.duration for course in courses)
+    whole = sum(course.duration for course in courses)
+    longest = max(*(course.duration for course in courses), whole / TOGETHER)
     legs = []
     for course in courses:
         share = course.duration / longest

@@ -131,7 +131,7 @@ class Connector:
                 yield _turn_last(a, b)
             yield min(_driven(a, b, self.line or 0.0), key=_turned)
         elif self.frames:
-            for pattern in self._patterns(a, b, self.frames):
+            for pattern in self._patterns(a, b, self.frames[:1]):
                 yield pattern.moves(a)
 
     def _many(self, a: Pose, b: Pose) -> Iterator[tuple[Move, ...]]:

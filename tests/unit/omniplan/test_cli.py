@@ -226,6 +226,9 @@ def test_serve_answers_queries_until_it_is_stopped(
             file = str(tmp_path / "verdicts.parquet")
             many = ["query", "many", turn, "--output", file, *to_it]
             assert run_json(capsys, *many) == {"output": file, "pairs": 1, "valid": 1}
+            file = str(tmp_path / "mecanum.safetensors")
+            sheet = ["query", "sheet", "--vehicle", "mecanum", "--output", file]
+            assert run_json(capsys, *sheet, *to_it) == {"output": file}
         finally:
             server.terminate()
         assert server.wait(timeout=20) == 0

@@ -24,6 +24,7 @@ def test_a_path_is_timed_and_judged(
     text = capsys.readouterr().out
     assert text.startswith("timed: c by mecanum: 3.2")
     assert "c by mecanum: permitted" in text
+    assert "s as timed, at best" in text
 
 
 def test_a_path_that_cannot_be_driven_is_a_no(

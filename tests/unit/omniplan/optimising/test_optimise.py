@@ -219,6 +219,7 @@ def test_a_bend_that_is_too_narrow_is_widened_a_little(
     )
 
 
+@pytest.mark.slow
 def test_a_hit_is_evaded_by_a_small_change(mecanum: PermissibleSpace) -> None:
     obstacles = Obstacles.from_polygons(PILLAR)
     given = line(y=0.5)  # 0.32 m wide: 7 cm too near
@@ -253,6 +254,7 @@ def test_an_optimum_is_returned_as_it_is(mecanum: PermissibleSpace) -> None:
     assert plan.statistics["before"] == plan.statistics["after"]
 
 
+@pytest.mark.slow
 def test_a_plan_is_a_start(mecanum: PermissibleSpace) -> None:
     first = optimise(CORNER, mecanum, intervals=12, time=LONG)
     second = optimise(first, mecanum, time=LONG)

@@ -136,6 +136,7 @@ def test_more_intervals_come_nearer_to_the_optimum(mecanum: PermissibleSpace) ->
     assert durations[2] < durations[1] < durations[0]
 
 
+@pytest.mark.slow
 def test_wheels_get_the_time_to_turn_at_a_stop(steered: PermissibleSpace) -> None:
     legs = eased([0, 0, 0], [1, 0, 0]), eased([1, 0, 0], [1, 1, 0])
     start = Guess(legs, (0.0,))
