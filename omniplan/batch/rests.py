@@ -43,8 +43,8 @@ def _rest(
 
     The interval is halved towards the rest until the vehicle is taken to stand over
     what is left. `out` gets that time and the most that it may be off by, if the parts
-    of `validate` are cut finer there, infinite if not known; then the velocity of K and ω. Returns whether
-    this is known.
+    of `validate` are cut finer there, infinite if not known; then the velocity of K and
+    ω. Returns whether this is known.
     """
     view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
     start, end = knot[12], knot[13]

@@ -1,8 +1,8 @@
 """Caps of a path on speed and yaw rate, proved between the samples of a trajectory.
 
 No limit of a vehicle, so `validate` does not know them. The fastest point of the body
-is a corner of its footprint or the path's own point. Between two samples the way along
-the path counts as even: there a cap changes where the path has its pose.
+is a corner of its footprint or the path's own point. A cap changes when the way along
+the path, a cubic spline of time like the poses, passes the pose at which it does.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 
 from omniplan.judging.body_rows import yaw_of
 from omniplan.judging.chords import Chord
@@ -21,7 +22,7 @@ __all__ = ["cap_use"]
 
 FloatArray = npt.NDArray[np.float64]
 
-HALVINGS = 2
+HALVINGS = 3
 """How often what lies between two samples is halved for the bounds."""
 
 
@@ -65,10 +66,22 @@ def _parts(
 ) -> tuple[Intervals, FloatArray]:
     """Return what lies between samples, cut at the path's knots, and u amid it."""
     knots = piece.u[(piece.u > u[0]) & (piece.u < u[-1])]
-    when, where = np.append(t, np.interp(knots, u, t)), np.append(u, knots)
+    when, where = np.append(t, _passed(t, u, knots)), np.append(u, knots)
     order = np.argsort(when, kind="stable")
     when, where = when[order], where[order]
     real = np.flatnonzero(np.diff(when) > 0)
     t0, t1 = when[real], when[real + 1]
     k = np.clip(np.searchsorted(t, t0, side="right") - 1, 0, t.size - 2)
     return Intervals(k, t0, t1), (where[real] + where[real + 1]) / 2
+
+
+def _passed(t: FloatArray, u: FloatArray, knots: FloatArray) -> FloatArray:
+    """Return when the way u(t), from rest to rest, passes places; by halving."""
+    way = CubicSpline(t, u, bc_type="clamped")
+    k = np.clip(np.searchsorted(u, knots, side="right") - 1, 0, t.size - 2)
+    low, high = t[k], t[k + 1]
+    for _ in range(50):
+        middle = (low + high) / 2
+        is_before = way(middle) < knots
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    return np.asarray((low + high) / 2)

@@ -193,17 +193,25 @@ def _smooth(
     speed = (rise[1:] + rise[:-1]) / 2
     between = (rise[:-2] + 6 * rise[1:-1] + rise[2:]) / 8
     middle = (c[:-3] + 23 * c[1:-2] + 23 * c[2:-1] + c[3:]) / 48
-    place = np.concatenate([u, middle])
+    given = problem.pieces[piece]
+    knots = given.u[1:-1][_caps_change(given)]
+    at = _at_knots(c, u, knots)
+    k = np.minimum(at.astype(np.int64), count - 1)
+    h = at - k
+    slow = (1 - h) ** 2 * rise[k] + (1 + 2 * h * (1 - h)) * rise[k + 1]
+    slow = (slow + h**2 * rise[k + 2]) / 2
+    bent = (1 - h) * change[k] + h * change[k + 1]
+    # A cap changes at a knot: both sides of it count.
+    place = np.concatenate([u, middle, np.nextafter(knots, first), knots])
     factor = problem.slowdowns(
         piece,
         profile.sigma,
         place,
-        np.concatenate([speed, between]),
-        np.concatenate([change, (change[1:] + change[:-1]) / 2]),
+        np.concatenate([speed, between, slow, slow]),
+        np.concatenate([change, (change[1:] + change[:-1]) / 2, bent, bent]),
     )
     # Something must be left for the proof between the samples.
     factor = factor * (1 + MARGIN / 2)
-    given = problem.pieces[piece]
     if problem.bounds_steering_acceleration:
         turn, lever = problem.steering_gain(piece, u)
         samples = _samples_per_step(c, dt, turn)
@@ -221,6 +229,24 @@ def _smooth(
         t, u = s * dt, _spline_at(c, s)
         u[[0, -1]] = first, last
     return SampledPiece(t, u, given, float(factor.max())), place, factor
+
+
+def _caps_change(piece: PathPiece) -> BoolArray:
+    """Return at which of the inner knots a cap changes."""
+    caps = np.stack([piece.max_speed, piece.max_yaw_rate])
+    return np.asarray((caps[:, 1:] != caps[:, :-1]).any(axis=0), dtype=bool)
+
+
+def _at_knots(c: FloatArray, u: FloatArray, knots: FloatArray) -> FloatArray:
+    """Return where the B-spline, which grows, takes inner knots; by halving."""
+    k = np.searchsorted(u, knots, side="right") - 1
+    low = np.clip(k, 0, u.size - 2).astype(np.float64)
+    high = low + 1
+    for _ in range(50):
+        middle = (low + high) / 2
+        is_before = _spline_at(c, middle) < knots
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    return np.asarray((low + high) / 2)
 
 
 def _is_rounded(piece: PathPiece, u: FloatArray, reach: FloatArray) -> BoolArray:

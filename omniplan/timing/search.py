@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -85,15 +84,17 @@ class _Try:
     proved: Proved
     report: Report
     """Its speed factor is what the margins promise."""
+    slowdowns: FloatArray
+    """How many times more slowly every part had to be passed."""
 
-    @cached_property
+    @property
     def estimate(self) -> float:
         """How long it takes, if need be slowed down as a whole, s."""
         if self.report.valid:
             return self.report.duration
         if not self.is_mendable:
             return math.inf
-        return self.report.duration * max(float(slowdowns_of(self.proved).max()), 1.0)
+        return self.report.duration * max(float(self.slowdowns.max()), 1.0)
 
     @property
     def is_mendable(self) -> bool:
@@ -159,13 +160,13 @@ class Timer:
         tries: list[_Try] = []
         for finer in REFINEMENTS:
             legs = self._legs(problem, numbers, chosen, waits, tight, finer)
-            one = self._tried(_trajectory(path, legs))
+            one = self._tried(_trajectory(path, legs), legs, chosen)
             tries.append(one)
             if _is_enough(tries, profile.duration):
                 break
             if not one.is_mendable or (one.report.valid and not any_is_tight(tight)):
                 break
-            self._tighten(tight, legs, chosen, one.proved)
+            self._tighten(tight, legs, chosen, one)
         tries.sort(key=lambda one: one.estimate)
         timing = self._proved(path, tries[0], profile)
         for one in tries[1:CANDIDATES]:
@@ -266,16 +267,22 @@ class Timer:
             now = float(t[-1]) + wait * (1 + 1e-6) + DWELL
         return legs
 
-    def _tried(self, trajectory: Trajectory) -> _Try:
+    def _tried(
+        self, trajectory: Trajectory, legs: list[_Leg], chosen: list[PieceProfile]
+    ) -> _Try:
         """Return a trajectory as it was judged, with waits as long as it demands."""
-        one = self._judged(trajectory)
+        proved, report = self._judged(trajectory)
         for _ in range(WAITS):
-            if not _waits_only(one.report):
+            if not _waits_only(report):
                 break
-            one = self._judged(_with_longer_waits(one.proved.trajectory, one.report))
-        return one
+            trajectory = _with_longer_waits(proved.trajectory, report)
+            proved, report = self._judged(trajectory)
+        spans, starts = proved.parts.spans, [leg.t[0] for leg in legs]
+        leg = np.searchsorted(starts, (spans.t0 + spans.t1) / 2, side="right") - 1
+        sign = np.array([one.sigma for one in chosen], dtype=np.int64)[leg]
+        return _Try(proved, report, slowdowns_of(proved, sign))
 
-    def _judged(self, trajectory: Trajectory) -> _Try:
+    def _judged(self, trajectory: Trajectory) -> tuple[Proved, Report]:
         proved = prove(
             trajectory,
             self._space,
@@ -283,17 +290,17 @@ class Timer:
             allow_unreachable=self._allow_unreachable,
             max_parts=PARTS,
         )
-        return _Try(proved, report_of(proved))
+        return proved, report_of(proved)
 
     def _tighten(
         self,
         tight: list[FloatArray],
         legs: list[_Leg],
         chosen: list[PieceProfile],
-        proved: Proved,
+        one: _Try,
     ) -> None:
         """Make the limits tighter where they were broken, looser where they are not."""
-        spans, asked = proved.parts.spans, slowdowns_of(proved)
+        spans, asked = one.proved.parts.spans, one.slowdowns
         for i, (leg, profile) in enumerate(zip(legs, chosen, strict=True)):
             pad = AROUND * float(leg.t[-1] - leg.t[0]) / self._steps
             times = np.interp(profile.u, leg.u, leg.t)

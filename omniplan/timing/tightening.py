@@ -18,6 +18,7 @@ from omniplan.proving import Proved
 __all__ = ["slowdowns_of", "tightened"]
 
 FloatArray = npt.NDArray[np.float64]
+SignArray = npt.NDArray[np.int64]
 
 SPARE = 1e-3
 """By this share more than was asked for a place is passed more slowly ..."""
@@ -29,7 +30,7 @@ UNDECIDED = 1.01
 """What is neither kept nor shown to be broken counts as used so much at most."""
 
 
-def slowdowns_of(proved: Proved) -> FloatArray:
+def slowdowns_of(proved: Proved, sign: SignArray) -> FloatArray:
     """Return how many times more slowly every part had to be passed, (m,).
 
     At most 1 where all limits are kept that driving slower mends; where one is neither
@@ -38,9 +39,12 @@ def slowdowns_of(proved: Proved) -> FloatArray:
     Parameters
     ----------
     proved : Proved
+    sign : (m,) int, {-1, 1}
+        The representation that was timed, of every part. Where limits are broken the
+        proof may have chosen the other.
     """
     rows = proved.judge.rows
-    low, high = proved.parts.picked(proved.choice.sign_of(proved.parts.spans))
+    low, high = proved.parts.picked(sign)
     mends = np.array([row.scaling != "none" for row in rows], dtype=bool)
     power = np.array([0.5 if row.scaling == "acceleration" else 1.0 for row in rows])
     low, high = low[:, mends], high[:, mends]

@@ -59,11 +59,9 @@ def assert_told(row: dict[str, Any], report: Report) -> None:
         assert row["bound"] == pytest.approx(told.bound), at
         worst = max(abs(v.value or 0.0) for v in alike)
         assert abs(row["value"]) <= worst * (1 + 1e-6), at
-        at_sample = told.excess_at_samples
-        if at_sample:
-            assert abs(row["value"]) == pytest.approx(
-                told.bound * (1 + at_sample), rel=1e-6
-            ), at
+        # Over a whole interval slip is held against the largest speed in it.
+        least = told.bound * (1 + (told.excess_at_samples or 0.0))
+        assert abs(row["value"]) >= least * (1 - 1e-6), at
 
 
 def some_motions(

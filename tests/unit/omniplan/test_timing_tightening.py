@@ -72,5 +72,7 @@ def test_a_slowdown_is_the_factor_that_is_missing(
     x = np.linspace(0.0, 1.0, 21)
     line = Trajectory.from_poses(4 * x, np.stack([x, 0 * x, 0 * x], axis=-1))
     quick = line.scaled(validate(line, mecanum).speed_factor * factor)
-    asked = slowdowns_of(prove(quick, mecanum))
+    proved = prove(quick, mecanum)
+    sign = np.ones(proved.parts.stands.size, dtype=np.int64)
+    asked = slowdowns_of(proved, sign)
     assert asked.max() == pytest.approx(factor, rel=2e-3)
