@@ -136,8 +136,9 @@ class Report:
 
         Proved ones first, then what no other speed would mend, then the largest excess
         at the samples: that does not depend on where motions are cut to prove limits.
-        Excesses that differ by rounding only are a tie: the first limit and wheel by
-        name are told then, and the earliest place.
+        Excesses that differ by rounding only are a tie: then a limit of a wheel comes
+        before one of the vehicle, the first limit and wheel by name, the earliest
+        place.
         """
         if not self.violations:
             return None
@@ -146,7 +147,7 @@ class Report:
         most = max(map(_told_excess, alike))
         least = most if math.isinf(most) else most - TIE * (1 + most)
         tied = [v for v in alike if _told_excess(v) >= least]
-        return min(tied, key=lambda v: (v.limit, v.wheel or "", v.t))
+        return min(tied, key=lambda v: (v.wheel is None, v.limit, v.wheel or "", v.t))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as plain data (JSON types only)."""

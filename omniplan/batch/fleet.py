@@ -230,8 +230,11 @@ def fleet_of(
 
 
 def _order(labels: Sequence[Label]) -> list[tuple[int, int]]:
-    """Return class and place in the alphabet of the rows of one vehicle."""
-    names = sorted({(label.limit, label.wheel) for label in labels})
+    """Return class and place among ties (`Report.headline`) of a vehicle's rows."""
+    names = sorted(
+        {(label.limit, label.wheel) for label in labels},
+        key=lambda name: (not name[1], name),
+    )
     limits = (
         *SHAPE_LIMITS,
         *(limit for limit, _ in names if limit not in SHAPE_LIMITS),

@@ -555,6 +555,13 @@ def test_a_smaller_vehicle_has_the_same_space(vehicle: Vehicle) -> None:
         for key in ("x", "y", "offset", "track", "steering_coupling"):
             if key in wheel:
                 wheel[key] *= factor
+        # At the same speeds a smaller vehicle has its angles change more quickly.
+        if wheel.get("max_steering_rate_deg"):
+            wheel["max_steering_rate_deg"] /= factor
+    if data["guaranteed"]:
+        data["guaranteed"] = {
+            key: rate and rate / factor for key, rate in data["guaranteed"].items()
+        }
     if data["reference_point"]:
         data["reference_point"] = [factor * x for x in data["reference_point"]]
     if data["skid_steer"]:
