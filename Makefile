@@ -6,7 +6,7 @@ TESTS ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-slow check format fix lint types layers \
-        examples bench docs clean
+        kernels examples bench docs clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
@@ -33,7 +33,9 @@ demo: $(VENV)/.run ## judge a mixed fleet over zenoh; pictures in demo-output/
 test: $(VENV)/.dev ## all checks and tests but the slow ones; what CI runs
 	$(MAKE) --no-print-directory check
 
-check: $(VENV)/.dev lint types layers examples ## format, lint, types, layers, examples, tests
+check: $(VENV)/.dev lint ## format, lint, types, layers, examples, tests
+	$(MAKE) --no-print-directory --jobs 2 --output-sync=target types layers kernels
+	$(MAKE) --no-print-directory examples
 	$(BIN)/python -m pytest -m "not slow" -n 2 $(TESTS)
 
 test-fast: $(VENV)/.dev ## unit tests only
@@ -55,6 +57,10 @@ types: $(VENV)/.dev
 
 layers: $(VENV)/.dev
 	$(BIN)/lint-imports
+
+# Or each of the tests' processes compiles them for itself.
+kernels: $(VENV)/.dev
+	$(BIN)/python -c "import configspace as c, services.operating.launch as s; s.warm_up([c.build_space(c.load_vehicle(n)) for n in ('mecanum', 'ackermann')])"
 
 examples: $(VENV)/.dev ## run every example
 	@for example in examples/*.py; do \

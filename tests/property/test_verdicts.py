@@ -169,14 +169,13 @@ def assert_pieces_are_sound(seed: int, vehicles: int, each: int) -> None:
     assert by_sheet > 0.9 * clear
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_valid_pieces_are_permitted_all_along(seed: int) -> None:
-    assert_pieces_are_sound(seed, vehicles=20, each=20)
+def test_valid_pieces_are_permitted_all_along() -> None:
+    assert_pieces_are_sound(1, vehicles=20, each=20)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("seed", range(4, 14))  # twenty thousand pieces in all
+@pytest.mark.parametrize("seed", range(2, 14))  # 24,000 pieces
 def test_many_more_valid_pieces_are_permitted_all_along(seed: int) -> None:
     assert_pieces_are_sound(seed, vehicles=100, each=20)
 
