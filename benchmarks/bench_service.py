@@ -79,9 +79,12 @@ def echo() -> Iterator[Callable[[bytes | None, int], None]]:
         session = zenoh.open(config)
 
         def ask(payload: bytes | None, size: int) -> None:
-            for reply in session.get(f"echo?{size}", payload=payload):
-                assert reply.ok is not None
-                assert len(reply.ok.payload.to_bytes()) == size
+            # As the client asks: what comes first is taken.
+            none = zenoh.ConsolidationMode.NONE
+            channel = session.get(f"echo?{size}", payload=payload, consolidation=none)
+            reply = next(iter(channel))
+            assert reply.ok is not None
+            assert len(reply.ok.payload.to_bytes()) == size
 
         while True:  # until the queryable is known
             with contextlib.suppress(StopIteration):

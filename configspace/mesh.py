@@ -11,10 +11,7 @@ that touch at a corner only are apart.
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
-import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +21,7 @@ import trimesh
 
 from configspace.area import permitted_area
 from configspace.errors import InvalidInput, Problem
+from configspace.files import reason_of, whole_file
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.places import (
     Blocks,
@@ -203,17 +201,13 @@ def export(mesh: trimesh.Trimesh, path: str | Path) -> None:
         raise InvalidInput(Problem("path", str(path), allowed))
     content = io.BytesIO()
     mesh.export(content, file_type=suffix[1:])
-    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(8)}")
     try:
-        temporary.write_bytes(content.getvalue())
-        os.replace(temporary, path)
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content.getvalue())
     except OSError as error:
         raise InvalidInput(
-            Problem("path", f"{path}: {error.strerror}", "must be writable")
+            Problem("path", f"{path}: {reason_of(error)}", "must be writable")
         ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def _walls(triangles: IntArray, below: int) -> IntArray:

@@ -15,6 +15,7 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
 
 from configspace.errors import InvalidInput, Problem
+from configspace.files import reason_of, whole_file
 from configspace.space import PermissibleSpace
 
 __all__ = [
@@ -101,7 +102,8 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     Raises
     ------
     InvalidInput
-        If the suffix is another one or the file cannot be written.
+        If the suffix is another one or the file cannot be written; an older file of
+        that name stays as it is.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -119,8 +121,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
             if buffer.tell() < MAX_PNG_BYTES:
                 break
     try:
-        path.write_bytes(buffer.getvalue())
+        with whole_file(path) as temporary:
+            temporary.write_bytes(buffer.getvalue())
     except OSError as error:
         raise InvalidInput(
-            Problem("path", f"{path}: {error.strerror}", "must be writable")
+            Problem("path", f"{path}: {reason_of(error)}", "must be writable")
         ) from error

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import secrets
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -16,6 +13,7 @@ from safetensors import SafetensorError
 from safetensors import numpy as safetensors
 
 from configspace.errors import CacheError
+from configspace.files import reason_of, whole_file
 from configspace.grid import Grid
 from configspace.kernels import MIXED
 from configspace.omni_curve import boundary_curvature
@@ -73,19 +71,12 @@ def save_space(space: PermissibleSpace, path: Path) -> None:
     CacheError
         If it cannot be written; nothing half written is left behind.
     """
-    # Not tempfile: its files can be read by their owner only.
-    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(8)}")
     try:
-        with temporary.open("xb") as file:
-            file.write(dump_space(space))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
+        with whole_file(path, sync=True) as temporary:
+            temporary.write_bytes(dump_space(space))
     except OSError as error:
-        raise CacheError(f"data sheet {path}: cannot be written: {error}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        why = reason_of(error)
+        raise CacheError(f"data sheet {path}: cannot be written: {why}") from error
 
 
 def load_space(path: str | Path) -> PermissibleSpace:

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from configspace.errors import InvalidVehicle, Problem
+from configspace.files import reason_of
 from configspace.undercarriage import impossible_rates
 from configspace.vehicle import (
     Castor,
@@ -100,18 +101,20 @@ def load_vehicle(name: str | Path) -> Vehicle:
     try:
         text = path.read_text("utf-8")
     except FileNotFoundError as error:
+        near = difflib.get_close_matches(str(name), catalog(), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
         known = ", ".join(catalog())
-        raise InvalidVehicle(
-            Problem(
-                "vehicle", f"no file {name!s}", f"a path or a catalogue name ({known})"
-            )
-        ) from error
+        allowed = f"a path or a catalogue name ({known}){hint}"
+        problem = Problem("vehicle", f"no file {name!s}", allowed)
+        raise InvalidVehicle(problem) from error
     except (
         OSError,
         ValueError,
     ) as error:  # ValueError: not UTF-8, or a NUL in the name
         raise InvalidVehicle(
-            Problem("vehicle", f"{name!s}: {error}", "a readable UTF-8 text file")
+            Problem(
+                "vehicle", f"{name!s}: {reason_of(error)}", "a readable UTF-8 text file"
+            )
         ) from error
     return parse_vehicle(text, subject=f"vehicle file {path}")
 

@@ -16,19 +16,25 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from configspace import Vehicle, exact_v_max
 from configspace.angles import wrap
 from configspace.exact import active_rows
 from configspace.limits import rows_of
 from configspace.vehicle import SteerableWheel
-from omniplan.judging.swing import Directions, Swing, directions_of_legs, factored
+from omniplan.judging.swing import (
+    Directions,
+    Pieces,
+    Swing,
+    directions_of_legs,
+    factored,
+)
 from omniplan.samples import HEADING_LENGTH
+from omniplan.splines import spline
 from omniplan.trajectory import Trajectory
 
 __all__ = [
@@ -44,6 +50,7 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 IntArray = npt.NDArray[np.int64]
+Number = TypeVar("Number", np.float64, np.complex128)
 
 STOP_TURN = np.radians(60)
 """A path that turns by more than this from sample to sample must stop there."""
@@ -105,6 +112,14 @@ class Enclosure:
     """Sign of v_s of the configuration that is meant (omni_curve), else 1."""
     swing: Swing | None = None
     """How directions swing; None where the twist may bend without bound."""
+
+    def rows(self, rows: slice) -> Enclosure:
+        """Return some of the parts."""
+        swing = None if self.swing is None else self.swing.rows(rows)
+        fields = {
+            name: values[rows] for name, values in vars(self).items() if name != "swing"
+        }
+        return Enclosure(**fields, swing=swing)
 
     def merged(self, others: Enclosure, order: IntArray) -> Enclosure:
         """Return parts of both: these and then the others, in a new order.
@@ -255,10 +270,9 @@ class PoseMotion:
         change, relative to its size, if divided by it. Elsewhere infinite.
         """
         t, middle = self.t, (self.t[1:] + self.t[:-1]) / 2
-        _, p1, p2, _ = _polynomial(
-            self.position, np.arange(t.size - 1), middle - t[:-1]
-        )
-        _, h1, h2, _ = _polynomial(self.heading, np.arange(t.size - 1), middle - t[:-1])
+        h = middle - t[:-1]
+        p1, p2 = _first(self.position, h), _second(self.position, h)
+        h1, h2 = _first(self.heading, h), _second(self.heading, h)
 
         def change(rest: FloatArray) -> FloatArray:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -282,59 +296,52 @@ class PoseMotion:
     def poses_at(self, t: FloatArray) -> FloatArray:
         """Return the poses at times t, (n, 3)."""
         knot = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
-        p = _polynomial(self.position, knot, t - self.t[knot])[0]
-        heading = _polynomial(self.heading, knot, t - self.t[knot])[0]
-        return np.stack([p.real, p.imag, heading.real], axis=-1)
-
-    def _at(
-        self, knot: IntArray, t: FloatArray
-    ) -> tuple[ComplexArray, FloatArray, ComplexArray, FloatArray, FloatArray]:
-        """Return v, ω, v̇, ω̇ and what bounds the third derivatives at times t."""
-        _, p1, p2, _ = _polynomial(self.position, knot, t - self.t[knot])
-        h0, h1, h2, _ = (
-            x.real for x in _polynomial(self.heading, knot, t - self.t[knot])
-        )
-        turn = np.exp(-1j * h0)
-        v = turn * p1 - 1j * h1 * self.point
-        v_dot = turn * (p2 - 1j * h1 * p1) - 1j * h2 * self.point
-        sizes = np.stack([np.abs(p1), np.abs(p2), np.abs(h1), np.abs(h2)])
-        return v, h1, v_dot, h2, sizes
+        h = t - self.t[knot]
+        p = _value(self.position[:, knot], h)
+        return np.stack([p.real, p.imag, _value(self.heading[:, knot], h)], axis=-1)
 
     def enclose(self, parts: Intervals) -> Enclosure:
         """Return an enclosure of every part."""
-        dt = parts.t1 - parts.t0
-        v0, o0, vd0, od0, at0 = self._at(parts.knot, parts.t0)
-        v1, o1, vd1, od1, at1 = self._at(parts.knot, parts.t1)
-        p1, p2, h1, h2 = np.maximum(at0, at1)
-        p3 = 6 * np.abs(self.position[0, parts.knot])
-        h3 = 6 * np.abs(self.heading[0, parts.knot])
+        k, dt = parts.knot, parts.t1 - parts.t0
+        position, heading = self.position[:, k], self.heading[:, k]
+        h = np.stack([parts.t0, parts.t1]) - self.t[k]
+        # Both ends at once, (2, m)
+        p1, p2 = _first(position, h), _second(position, h)
+        h0, h1, h2 = _value(heading, h), _first(heading, h), _second(heading, h)
+        turn = np.exp(-1j * h0)
+        v = turn * p1 - 1j * h1 * self.point
+        v_dot = turn * (p2 - 1j * h1 * p1) - 1j * h2 * self.point
+        p1_most, p2_most = np.abs(p1).max(axis=0), np.abs(p2).max(axis=0)
+        h1_most, h2_most = np.abs(h1).max(axis=0), np.abs(h2).max(axis=0)
+        p3, h3 = 6 * np.abs(position[0]), 6 * np.abs(heading[0])
         # The second derivative is linear, so its ends bound it; the first one bends.
-        p1 = p1 + dt**2 / 8 * p3
-        h1 = h1 + dt**2 / 8 * h3
+        bent = dt**2 / 8
+        p1_most, h1_most = p1_most + bent * p3, h1_most + bent * h3
         # d²/dt² (e^{-jθ} p') = e^{-jθ} (p''' - 2jθ'p'' - jθ''p' - θ'²p')
-        turn2, turn3 = h2 + h1**2, h3 + 3 * h1 * h2 + h1**3  # of |dᵏ/dtᵏ e^{-jθ}|
-        v_ddot = p3 + 2 * h1 * p2 + turn2 * p1 + h3 * abs(self.point)
-        v_dddot = 3 * h1 * p3 + 3 * turn2 * p2 + turn3 * p1
+        turn2 = h2_most + h1_most**2  # of |dᵏ/dtᵏ e^{-jθ}|
+        turn3 = h3 + 3 * h1_most * h2_most + h1_most**3
+        v_ddot = p3 + 2 * h1_most * p2_most + turn2 * p1_most + h3 * abs(self.point)
+        v_dddot = 3 * h1_most * p3 + 3 * turn2 * p2_most + turn3 * p1_most
         one, zero = np.ones_like(dt), np.zeros_like(dt)
-        ends = v0, v1, o0, o1, vd0, vd1, od0, od1
+        ends = v[0], v[1], h1[0], h1[1], v_dot[0], v_dot[1], h2[0], h2[1]
         bends = v_ddot, h3, v_dddot, zero
-        swing = self._swing(parts)
+        swing = Swing(dt, h, k, self.swinging)
         return Enclosure(dt, *ends, *bends, one, one, one, one, swing)
 
-    def _swing(self, parts: Intervals) -> Swing:
-        k = parts.knot
-        start, span = self.t[k], self.t[k + 1] - self.t[k]
-        rest = None if self.rest is None else self.rest[:, k]
-        since = self.since[k]
-        if rest is not None:
-            since = np.where(rest.any(axis=0), np.inf, since)
-        return Swing(
-            dt=parts.t1 - parts.t0,
-            h=np.stack([parts.t0 - start, parts.t1 - start]),
-            speed=factored(self.position[:, k], span, rest, since),
-            turn=factored(self.heading[:, k], span, rest, since),
+    def swinging(self) -> Pieces:
+        """Return the splines over a factor in which their directions swing evenly."""
+        return self._pieces
+
+    @cached_property
+    def _pieces(self) -> Pieces:
+        span, since = np.diff(self.t), self.since
+        if self.rest is not None:
+            since = np.where(self.rest.any(axis=0), np.inf, since)
+        return Pieces(
+            speed=factored(self.position, span, self.rest, since),
+            turn=factored(self.heading, span, self.rest, since),
             since=since,
-            heading=self.heading[:, k],
+            heading=self.heading,
             point=self.point,
         )
 
@@ -555,30 +562,25 @@ def _is_out(
     return out
 
 
-End: TypeAlias = Literal["not-a-knot"] | tuple[Literal[1, 2], FloatArray]
+def _value(cubic: npt.NDArray[Number], h: FloatArray) -> npt.NDArray[Number]:
+    """Return the values of cubic pieces, (4, m), at h, (..., m)."""
+    a, b, c, d = cubic
+    values: npt.NDArray[Number] = ((a * h + b) * h + c) * h + d
+    return values
 
 
-def spline(t: FloatArray, values: FloatArray, rest0: bool, rest1: bool) -> FloatArray:
-    """Return cubic coefficients (4, n - 1, ...) of (n, ...); at rest where asked."""
-    still = np.zeros(values.shape[1:])
-    # Without a fourth sample there is no third derivative to keep: natural ends.
-    free: End = "not-a-knot" if len(t) > 3 else (2, still)
-    rest: End = (1, still)
-    ends: Any = (rest if rest0 else free, rest if rest1 else free)
-    return np.asarray(CubicSpline(t, values, bc_type=ends).c)
+def _first(cubic: npt.NDArray[Number], h: FloatArray) -> npt.NDArray[Number]:
+    """Return the first derivatives of cubic pieces."""
+    a, b, c, _ = cubic
+    values: npt.NDArray[Number] = (3 * a * h + 2 * b) * h + c
+    return values
 
 
-def _polynomial(
-    coefficients: npt.NDArray[np.generic], knot: IntArray, h: FloatArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """Return value and three derivatives of cubic pieces."""
-    a, b, c, d = coefficients[:, knot]
-    return (
-        ((a * h + b) * h + c) * h + d,
-        (3 * a * h + 2 * b) * h + c,
-        6 * a * h + 2 * b,
-        6 * a,
-    )
+def _second(cubic: npt.NDArray[Number], h: FloatArray) -> npt.NDArray[Number]:
+    """Return the second derivatives of cubic pieces."""
+    a, b, _, _ = cubic
+    values: npt.NDArray[Number] = 6 * a * h + 2 * b
+    return values
 
 
 def _with_crossings(

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import Problem
-from configspace.angles import wrap
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.nurbs import Nurbs
 from omniplan.inputs.route import Route, Tolerance
@@ -19,9 +18,9 @@ from omniplan.samples import (
     checked_name,
     checked_point,
     invalid_row,
+    joined_headings,
     locked,
     numbers,
-    reject_jump,
     reject_outside,
     unwrapped,
     whole_number,
@@ -102,8 +101,7 @@ class Path:
             raise InvalidTrajectory(Problem(name, given, allowed))
         for column, label in enumerate(("x", "y", "theta")):
             reject_outside(name, samples[:, column], label, MAX_VALUE)
-        reject_jump(name, "theta", "the heading", wrap(np.diff(samples[:, 2])))
-        samples[:, 2] = unwrapped(samples[:, 2])
+        samples[:, 2] = joined_headings(name, samples[:, 2])
         _reject_rest(name, samples)
         n = len(samples)
         return cls(

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from configspace import PermissibleSpace
 from omniplan.judging.judge import is_own, judge_for
-from omniplan.judging.proof import ROUNDING, Parts, Proof
+from omniplan.judging.proof import ROUNDING, Parts, Proof, refused
 from omniplan.judging.rows import Judge, Tolerances
 from omniplan.motion import Motion, motion_of
 from omniplan.standing.standstill import Choice, choose_configurations
@@ -41,8 +41,22 @@ class Proved:
     tolerances: Tolerances
     parts: Parts
     choice: Choice
-    first: Parts
-    """The intervals between the samples, uncut."""
+    proof: Proof
+    """Where the parts come from."""
+
+    @property
+    def first(self) -> Parts:
+        """The intervals between the samples, uncut."""
+        return self.proof.first
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether every limit is proved to hold, and every standstill long enough."""
+        choice, parts = self.choice, self.parts
+        if choice.apart or any(stop.is_short for stop in choice.standstills):
+            return False
+        low, high = parts.picked(choice.sign_of(parts.spans))
+        return not refused(low, high, self.judge.rows).any()
 
 
 def prove(
@@ -53,6 +67,8 @@ def prove(
     allow_unreachable: bool = False,
     longest: float | None = None,
     max_parts: int | None = None,
+    like: Proved | None = None,
+    checkpoint: Callable[[], None] | None = None,
 ) -> Proved:
     """Return the parts of a trajectory as `validate` judges them.
 
@@ -66,23 +82,31 @@ def prove(
         No part is longer than this.
     max_parts : int, optional
         How many more parts than samples there may be; more limits may stay undecided.
+    like : Proved, optional
+        Of the same trajectory at another speed: it is cut in the same way to begin
+        with, which saves time where only `Proved.is_valid` is asked.
+    checkpoint : callable, optional
+        Called again and again; what it raises ends the work.
     """
     tolerances = tolerances or Tolerances()
     motion = motion_of(trajectory, is_own=is_own(trajectory, space))
     judge = judge_for(space, motion, tolerances)
-    proof = Proof(motion, judge, tolerances, max_parts)
+    cuts = () if like is None else like.proof.cuts
+    proof = Proof(
+        motion, judge, tolerances, max_parts, cuts=cuts, checkpoint=checkpoint
+    )
     proof.decide()
     proof.separate()
     choice = choose_configurations(
         proof, judge, space, tolerances, allow_unreachable=allow_unreachable
     )
-    proof.sharpen(choice.sign_of)
+    if like is None:
+        proof.sharpen(choice.sign_of)
     if longest is not None:
         proof.refine(lambda parts: parts.spans.t1 - parts.spans.t0 > longest)
         proof.refine(_loose(choice), LOOSE_HALVINGS)
     parts = _followed(proof, choice, judge, tolerances)
-    first = proof.first
-    return Proved(trajectory, space, motion, judge, tolerances, parts, choice, first)
+    return Proved(trajectory, space, motion, judge, tolerances, parts, choice, proof)
 
 
 def _followed(

@@ -20,9 +20,9 @@ __all__ = [
     "checked_name",
     "checked_point",
     "invalid_row",
+    "joined_headings",
     "locked",
     "numbers",
-    "reject_jump",
     "reject_outside",
     "unwrapped",
     "whole_number",
@@ -112,18 +112,37 @@ def reject_outside(name: str, column: FloatArray, label: str, limit: float) -> N
         raise invalid_row(name, row, label, f"{column[row]}", allowed)
 
 
-def reject_jump(name: str, column: str, what: str, step: FloatArray) -> None:
-    """Raise with the row of the first turn that is too large to be clear."""
-    jump = np.flatnonzero(np.abs(step) > MAX_HEADING_STEP)
+def joined_headings(name: str, headings: FloatArray) -> FloatArray:
+    """Return headings joined the shorter way round, or raise where that is not clear.
+
+    Parameters
+    ----------
+    name : str
+        Of the trajectory or path.
+    headings : (n,) float, rad
+        Wrapped or not.
+
+    Raises
+    ------
+    InvalidTrajectory
+        With the row of the first turn of more than 90°, or of a step that no way of
+        counting angles explains: such headings are degrees.
+    """
+    step = np.diff(headings)
+    far = np.flatnonzero(np.abs(step) > 2 * math.pi + MAX_HEADING_STEP)
+    if far.size:
+        row = int(far[0])
+        given = f"{headings[row + 1]:g} after {headings[row]:g}"
+        allowed = "radians, at most a turn and a quarter apart"
+        raise invalid_row(name, row + 1, "theta", given, allowed)
+    turn = wrap(step)
+    jump = np.flatnonzero(np.abs(turn) > MAX_HEADING_STEP)
     if jump.size:
         row = int(jump[0])
-        raise invalid_row(
-            name,
-            row + 1,
-            column,
-            f"{what} turns by {math.degrees(step[row]):.1f}° from row {row}",
-            "at most 90° per row, or the way round is not clear",
-        )
+        given = f"the heading turns by {math.degrees(turn[row]):.1f}° from row {row}"
+        allowed = "at most 90° per row, or the way round is not clear"
+        raise invalid_row(name, row + 1, "theta", given, allowed)
+    return unwrapped(headings)
 
 
 def unwrapped(angles: FloatArray) -> FloatArray:

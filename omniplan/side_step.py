@@ -51,7 +51,7 @@ def side_step(
     report: Report,
     trajectory: Trajectory,
     space: PermissibleSpace,
-    ask: Callable[[Trajectory], Report],
+    holds: Callable[[Trajectory], bool],
 ) -> tuple[Advice, ...]:
     """Return the advice to move in another direction at the most telling violation.
 
@@ -64,8 +64,8 @@ def side_step(
         Not valid.
     trajectory : Trajectory
     space : PermissibleSpace
-    ask : callable
-        Validates a trajectory.
+    holds : callable
+        Returns whether a trajectory is valid.
     """
     worst = report.headline
     bound = space.line_beta is not None or space.is_translating
@@ -80,7 +80,7 @@ def side_step(
     away = math.copysign(1.0, wrap(border - worst.beta))
     for inward in INWARD:
         beta = float(wrap(border + away * inward))
-        if ask(_steady(space, worst.kappa_n, beta, v_s)).valid:
+        if holds(_steady(space, worst.kappa_n, beta, v_s)):
             text = (
                 f"at t = {worst.t:.2f} s: move towards β = {math.degrees(beta):.1f}° "
                 f"instead of {math.degrees(worst.beta):.1f}°"

@@ -28,9 +28,9 @@ from omniplan.samples import (
     checked_name,
     checked_point,
     invalid_row,
+    joined_headings,
     locked,
     numbers,
-    reject_jump,
     reject_outside,
     unwrapped,
 )
@@ -125,8 +125,7 @@ class Trajectory:
         if t is None:
             return Path.from_poses(poses, name=name, reference_point=reference_point)
         times, samples = _checked(name, t, poses, COLUMNS["poses"])
-        reject_jump(name, "theta", "the heading", wrap(np.diff(samples[:, 2])))
-        samples[:, 2] = unwrapped(samples[:, 2])
+        samples[:, 2] = joined_headings(name, samples[:, 2])
         point = checked_point(name, reference_point)
         return cls(name, "poses", locked(times), locked(samples), point)
 

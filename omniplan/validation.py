@@ -48,6 +48,7 @@ def validate(
     tolerances: Tolerances | None = None,
     *,
     allow_unreachable: bool = False,
+    checkpoint: Callable[[], None] | None = None,
 ) -> Report:
     """Judge a trajectory for a vehicle.
 
@@ -66,6 +67,9 @@ def validate(
         vehicle must have been brought there otherwise. Without it a piece is refused
         as ``UNREACHABLE`` if the cells of the space prove that no way leads there; what
         they leave undecided counts as reachable.
+    checkpoint : callable, optional
+        Called every few milliseconds; what it raises ends the work. So a long proof can
+        be given up at a deadline.
 
     Returns
     -------
@@ -92,22 +96,28 @@ def validate(
     """
     require_space(space)
     ask = partial(
-        judged,
+        prove,
         space=space,
         tolerances=tolerances or Tolerances(),
         allow_unreachable=allow_unreachable,
+        checkpoint=checkpoint,
     )
     trajectory = timed(trajectory)
-    report = ask(trajectory)
-    factor = _proved_factor(report, trajectory, ask)
+    proved = ask(trajectory)
+    report = report_of(proved)
+    factor = _proved_factor(report, proved, ask)
     fastest = trajectory.duration / factor if factor > 0 else None
     report = replace(report, speed_factor=factor, fastest_duration=fastest)
     if report.valid:
         return report
+
+    def holds(other: Trajectory) -> bool:
+        return ask(other).is_valid
+
     advice = (
         *_slow_down(report, trajectory),
-        *_dwell(report, trajectory, ask),
-        *side_step(report, trajectory, space, ask),
+        *_dwell(report, trajectory, holds),
+        *side_step(report, trajectory, space, holds),
     )
     return replace(report, advice=advice)
 
@@ -243,11 +253,7 @@ def _not_judged(space: PermissibleSpace, motion: Motion) -> Iterator[str]:
             yield f"limits.{name}"
 
 
-def _proved_factor(
-    report: Report,
-    trajectory: Trajectory,
-    ask: Callable[[Trajectory], Report],
-) -> float:
+def _proved_factor(report: Report, proved: Proved, ask: Callable[..., Proved]) -> float:
     """Return a factor on the speed that validating again has proved, 0 if none.
 
     What the utilisations promise is tried first; as they are sharp to a part in 1000
@@ -255,26 +261,27 @@ def _proved_factor(
     standing and as slip does not scale with the speed; then a factor is found that is
     proved and at most 1 % below one that is not.
     """
+    trajectory = proved.trajectory
     promised = min(report.speed_factor * (1 - 1e-9), MAX_FACTOR)
-    proved = 1.0 if report.valid else 0.0
+    least = 1.0 if report.valid else 0.0
     if trajectory.form == "omni_curve":  # v_n stays in [-1, 1]
         largest = float(np.abs(trajectory.samples[:, 2]).max())
         promised = min(promised, 1 / max(largest, 1e-9))
-    if promised <= max(proved, MIN_FACTOR):
-        return proved
+    if promised <= max(least, MIN_FACTOR):
+        return least
 
     def holds(factor: float) -> bool:
-        return ask(trajectory.scaled(factor)).valid
+        return ask(trajectory.scaled(factor), like=proved).is_valid
 
     if holds(promised):
         return promised
-    while promised > FACTOR_STEP * max(proved, MIN_FACTOR):
-        middle = math.sqrt(max(proved, MIN_FACTOR) * promised)
+    while promised > FACTOR_STEP * max(least, MIN_FACTOR):
+        middle = math.sqrt(max(least, MIN_FACTOR) * promised)
         if holds(middle):
-            proved = middle
+            least = middle
         else:
             promised = middle
-    return proved
+    return least
 
 
 def _slow_down(report: Report, trajectory: Trajectory) -> tuple[Advice, ...]:
@@ -291,7 +298,7 @@ def _slow_down(report: Report, trajectory: Trajectory) -> tuple[Advice, ...]:
 def _dwell(
     report: Report,
     trajectory: Trajectory,
-    ask: Callable[[Trajectory], Report],
+    holds: Callable[[Trajectory], bool],
 ) -> tuple[Advice, ...]:
     """Return the advice to stand still longer, if that is proved to help."""
     short = [v for v in report.violations if v.limit == "RECONFIGURATION"]
@@ -305,7 +312,7 @@ def _dwell(
         wait = violation.value * (1 + 1e-9) + 1e-6
         longer = longer.with_dwell(row, wait)
         waits.append((float(trajectory.t[row]), wait))
-    if not ask(longer).valid:
+    if not holds(longer):
         return ()
     text = " and ".join(f"{wait:.2f} s at t = {t:.2f} s" for t, wait in waits[::-1])
     total = sum(wait for _, wait in waits)

@@ -109,6 +109,7 @@ def ranked_by(
     *,
     requirements: Iterable[Requirement | str] = (),
     allow_unreachable: bool = False,
+    checkpoint: Callable[[], None] | None = None,
 ) -> Callable[[Trajectory | Path], Ranking]:
     """Return the function that ranks a fleet for one trajectory after the other.
 
@@ -121,6 +122,8 @@ def ranked_by(
     requirements : iterable of Requirement or str
     allow_unreachable : bool
         As for `select`, all of them.
+    checkpoint : callable, optional
+        As for `validate`.
 
     Raises
     ------
@@ -139,7 +142,7 @@ def ranked_by(
     )
     names = {one.vehicle for one in unfit}
     fit = [vehicle for vehicle in vehicles if vehicle.id not in names]
-    question = _Question(by, asked, allow_unreachable)
+    question = _Question(by, asked, allow_unreachable, checkpoint)
     return partial(_ranked, fit, question, unfit)
 
 
@@ -157,10 +160,15 @@ class _Question:
     """Judges vehicle types for trajectories."""
 
     def __init__(
-        self, by: str | Score, asked: tuple[Requirement, ...], allow_unreachable: bool
+        self,
+        by: str | Score,
+        asked: tuple[Requirement, ...],
+        allow_unreachable: bool,
+        checkpoint: Callable[[], None] | None,
     ) -> None:
         self._by, self._asked = by, asked
         self._allow_unreachable = allow_unreachable
+        self._checkpoint = checkpoint
         self._watches_passage = any(
             isinstance(one, NoMirroring | PassableBackwards) for one in asked
         )
@@ -189,7 +197,9 @@ class _Question:
         is_fastest: bool = False,
     ) -> _Verdict:
         allow = self._allow_unreachable
-        report = validate(trajectory, space, allow_unreachable=allow)
+        report = validate(
+            trajectory, space, allow_unreachable=allow, checkpoint=self._checkpoint
+        )
         if not report.valid:
             return _Verdict(report, (), 0.0)
         if is_fastest:  # what is left of the vehicle's limits, the path's may forbid
@@ -199,7 +209,12 @@ class _Question:
 
         @cache
         def proved() -> Proved:
-            return prove(trajectory, space, allow_unreachable=allow)
+            return prove(
+                trajectory,
+                space,
+                allow_unreachable=allow,
+                checkpoint=self._checkpoint,
+            )
 
         if self._watches_passage:
             short = passage_shortfalls(proved(), self._asked, allow_unreachable=allow)

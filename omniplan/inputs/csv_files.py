@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import Problem
+from configspace.files import reason_of
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.table import Header, Table, header_of, merged, span
 
@@ -39,7 +40,7 @@ def read_csv(path: FilePath) -> Table:
         data = path.read_bytes()
     except OSError as error:
         raise InvalidTrajectory(
-            Problem(f"{path}", str(error), "a readable UTF-8 CSV file")
+            Problem(f"{path}", reason_of(error), "a readable UTF-8 CSV file")
         ) from error
     # Comments become empty lines, so that lines keep their numbers.
     data = COMMENT.sub(b"", data.removeprefix(b"\xef\xbb\xbf"))
@@ -106,7 +107,7 @@ def _read_slowly(path: FilePath, data: bytes) -> Table:
         lines = data.decode().splitlines()
     except UnicodeDecodeError as error:
         raise InvalidTrajectory(
-            Problem(f"{path}", str(error), "a readable UTF-8 CSV file")
+            Problem(f"{path}", reason_of(error), "a readable UTF-8 CSV file")
         ) from error
     reader = csv.reader(lines)
     numbers: list[list[float]] = []
@@ -147,7 +148,11 @@ def _numbers(
 ) -> list[float]:
     if len(row) != len(head):
         raise InvalidTrajectory(
-            Problem(f"{path}: line {line}", f"{len(row)} values", f"{len(head)}")
+            Problem(
+                f"{path}: line {line}",
+                f"{len(row)} values",
+                f"{len(head)}, as the header has",
+            )
         )
     values = []
     for name in header.numbers:

@@ -10,13 +10,20 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path as FilePath
 
+import numpy as np
+import numpy.typing as npt
+
 from configspace import InvalidInput, Problem, Vehicle
+from configspace.files import reason_of, whole_file
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.table import columns_of, trajectories_of
 from omniplan.path import Path
 from omniplan.trajectory import Trajectory
 
 __all__ = ["read_trajectories", "write_trajectories"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 def read_trajectories(
@@ -74,7 +81,8 @@ def write_trajectories(
     Raises
     ------
     InvalidInput
-        If there are none, their forms differ, or the arguments are swapped.
+        If there are none, their forms differ, the arguments are swapped, or the file
+        cannot be written; an older file of that name stays as it is.
     InvalidTrajectory
         If the name of the file ends in ``.json``.
     """
@@ -86,14 +94,27 @@ def write_trajectories(
     if path.suffix.lower() == ".json":
         raise InvalidTrajectory(Problem(f"{path}", "JSON", ".csv or .parquet"))
     table = columns_of(trajectories)
+    try:
+        with whole_file(path) as temporary:
+            _write(temporary, *table)
+    except OSError as error:
+        allowed = "must be writable"
+        raise InvalidInput(
+            Problem("path", f"{path}: {reason_of(error)}", allowed)
+        ) from error
+
+
+def _write(
+    path: FilePath, names: list[str], sizes: IntArray, columns: dict[str, FloatArray]
+) -> None:
     if path.suffix.lower() == ".parquet":
         from omniplan.inputs.parquet_files import write_parquet
 
-        write_parquet(path, *table)
+        write_parquet(path, names, sizes, columns)
     else:
         from omniplan.inputs.csv_files import write_csv
 
-        write_csv(path, *table)
+        write_csv(path, names, sizes, columns)
 
 
 def _listed(motions: object) -> tuple[Trajectory | Path, ...]:

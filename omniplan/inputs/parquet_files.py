@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import Problem
+from configspace.files import reason_of
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.table import Table, header_of, merged, span
 
@@ -39,10 +40,8 @@ def read_parquet(path: FilePath) -> Table:
             _check_types(path, schema)
             table = file.read()
     except (pa.ArrowException, OSError, EOFError) as error:
-        # The first line of these errors says what is wrong.
-        given = (str(error).splitlines() or [type(error).__name__])[0]
         raise InvalidTrajectory(
-            Problem(f"{path}", given[:200], "a readable Parquet file")
+            Problem(f"{path}", reason_of(error), "a readable Parquet file")
         ) from error
     if not table.num_rows:
         raise InvalidTrajectory(Problem(f"{path}", "no rows", "at least two rows"))

@@ -10,6 +10,7 @@ of the last row are not used) and ``stop``, 1 where the vehicle must stand, else
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -83,7 +84,7 @@ def header_of(source: str, names: Sequence[str]) -> Header:
     if repeated:
         given = f"column {repeated[0]} twice"
     elif unknown:
-        given = f"unknown column {unknown[0]!r}"
+        given = f"unknown column {unknown[0]!r}{_hint(unknown[0])}"
     elif len(forms) != 1 or known & SAMPLES != set(COLUMNS[forms[0]]):
         given = f"columns {', '.join(names)}"
     elif not is_timed and forms[0] != "poses":
@@ -100,6 +101,14 @@ def header_of(source: str, names: Sequence[str]) -> Header:
         numbers = tuple(name for name in names if name != "trajectory")
         return Header(forms[0], is_timed, numbers, "trajectory" in known)
     raise InvalidTrajectory(Problem(f"{source}: header", given, allowed))
+
+
+def _hint(unknown: str) -> str:
+    """Return what may be meant by an unknown column."""
+    if any(mark in unknown for mark in ";\t|"):
+        return " (columns are separated by commas)"
+    near = difflib.get_close_matches(unknown.lower(), KNOWN, n=1, cutoff=0.8)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 def span(what: str, first: int, last: int) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import Problem
+from configspace.files import reason_of
 from omniplan.errors import InvalidTrajectory
 from omniplan.inputs.nurbs import Labels, Nurbs
 from omniplan.inputs.route import Line, Route, Tolerance
@@ -59,9 +60,13 @@ def read_orders(
     file = FilePath(file)
     try:
         data = json.loads(file.read_text("utf-8-sig"), parse_constant=_no_number)
-    except (OSError, ValueError, RecursionError) as error:
+    except RecursionError as error:
         raise InvalidTrajectory(
-            Problem(f"{file}", str(error) or "nested too deeply", "a JSON file, UTF-8")
+            Problem(f"{file}", "nested too deeply", "a JSON file, UTF-8")
+        ) from error
+    except (OSError, ValueError) as error:
+        raise InvalidTrajectory(
+            Problem(f"{file}", reason_of(error), "a JSON file, UTF-8")
         ) from error
     orders = data if isinstance(data, list) else [data]
     if not orders:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,115 +11,145 @@ import numpy.typing as npt
 
 from configspace.limits import SectorRow
 from configspace.omni_curve import POLE
-from configspace.vehicle import SteerableWheel
 from omniplan.judging.chords import Change, Chord, excess, growth_excess, over
+from omniplan.judging.points import Points, column
 from omniplan.judging.rows import Bounds
 from omniplan.motion import Enclosure
 
-__all__ = ["beside_axis", "beside_gain", "zone_bounds"]
+__all__ = [
+    "Levers",
+    "Zone",
+    "beside_axis",
+    "beside_gains",
+    "beside_own",
+    "zone_bounds",
+]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 
+@dataclass(frozen=True, eq=False)
+class Levers:
+    """What steering costs n wheels on their axes of the same kind."""
+
+    offsets: tuple[FloatArray | None, ...]
+    """(n, 1) D of every wheel on an axis, > 0: left of it, m; None: on the axis."""
+    coupling: FloatArray | None
+    """(n, 1) metres of rolling that a radian costs shared motors, m; None: nothing."""
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether steering costs nothing."""
+        return self.coupling is None and all(d is None for d in self.offsets)
+
+
+def beside_own(
+    levers: Levers, limit: FloatArray, part: Enclosure, rate: Bounds
+) -> Iterator[Bounds]:
+    """Yield the utilisation of the rolling speed of the vehicle's own parameters.
+
+    v_n is the share that driving takes, so what steering takes must fit into the rest.
+    """
+    for offset in levers.offsets:
+        lever = _length(offset, levers.coupling)
+        if lever is None:
+            continue
+        share = [r * lever / limit for r in rate]
+        low = np.maximum(part.scale0, part.scale1)
+        yield np.where(share[0] > 0, low, 0.0), part.scale_high + share[1]
+
+
+def _length(
+    offset: FloatArray | None, coupling: FloatArray | None
+) -> FloatArray | None:
+    """Return how much a wheel rolls per radian that it steers, m; None: not at all."""
+    if offset is None:
+        return coupling
+    return np.abs(offset) if coupling is None else np.abs(offset) + coupling
+
+
 def beside_axis(
-    wheel: SteerableWheel,
+    levers: Levers,
+    limit: FloatArray,
     part: Enclosure,
     chord: Chord,
     change: Change,
-    own: FloatArray,
+    owns: Sequence[FloatArray],
     rate: Bounds,
     moving: tuple[FloatArray, FloatArray],
-    is_own: bool,
-) -> Iterator[Bounds]:
+) -> Iterator[list[Bounds]]:
     """Yield the utilisation of the rolling speed where steering takes a share of it.
 
-    ``|û| + k |α̇|`` with ``û = u - (ω + α̇) D`` for every offset D, k for shared motors.
-    Of a vehicle's own Omni-Curve-Parameters v_n is the share that driving takes, so
-    what steering takes must fit into the rest. `moving` is 0 at ends where the vehicle
-    stands: how a wheel seems to turn there may be rounding.
+    ``|û| + k |α̇|`` with ``û = u - (ω + α̇) D`` for every offset D, k for shared motors;
+    one for every sign of v_s in `owns`, or one for all. `moving` is 0 at ends where the
+    vehicle stands: how a wheel seems to turn there may be rounding.
     """
-    limit = wheel.max_speed
-    assert limit is not None
-    coupling = wheel.steering_coupling
-    if is_own:
-        for lever in (abs(offset) + coupling for offset in wheel.offsets):
-            if lever == 0:
-                continue
-            share = [r * lever / limit for r in rate]
-            low = np.maximum(part.scale0, part.scale1)
-            yield np.where(share[0] > 0, low, 0.0), part.scale_high + share[1]
-        return
+    coupling = levers.coupling
     turn = [
         np.where(near > 1e-12, (d * u.conj()).imag / np.maximum(near, 1e-12) ** 2, 0.0)
-        for u, d, near in (
-            (chord.a, change.a, np.abs(chord.a)),
-            (chord.b, change.b, np.abs(chord.b)),
+        for u, d, near in zip(
+            (chord.a, chord.b), (change.a, change.b), chord.sizes, strict=True
         )
     ]
-    for offset in wheel.offsets:
-        if offset:
-            levers = offset, coupling
-            yield over(
-                _offset_speed(levers, part, chord, change, own, turn, rate, moving),
-                limit,
+    for offset in levers.offsets:
+        if offset is not None:
+            speeds = _offset_speeds(
+                (offset, coupling), part, chord, change, owns, turn, rate, moving
             )
-        elif coupling:
-            sizes = np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1
+            yield [over(speed, limit) for speed in speeds]
+        elif coupling is not None:
+            sizes = chord.sizes[0] * part.scale0, chord.sizes[1] * part.scale1
             given = (
                 np.where(v > 0, u + coupling * np.abs(t), 0.0)
                 for v, u, t in zip(moving, sizes, turn, strict=True)
             )
             most = chord.far * part.scale_high + coupling * rate[1]
-            yield over((np.maximum(*given), most), limit)
+            yield [over((np.maximum(*given), most), limit)]
 
 
-def _offset_speed(
-    levers: tuple[float, float],
+def _offset_speeds(
+    levers: tuple[FloatArray, FloatArray | None],
     part: Enclosure,
     chord: Chord,
     change: Change,
-    own: FloatArray,
+    owns: Sequence[FloatArray],
     turn: list[FloatArray],
     rate: Bounds,
     moving: tuple[FloatArray, FloatArray],
-) -> Bounds:
-    """Return bounds on |û| + k |α̇| of a wheel D left of its axis; `levers` D and k.
+) -> Iterator[Bounds]:
+    """Yield bounds on |û| + k |α̇| of a wheel D left of its axis; `levers` D and k.
 
     With u = σ |U|: ``|û| = ||U| - σ (ω + α̇) D|``.
     """
     offset, coupling = levers
     omega = part.omega0 * part.scale0, part.omega1 * part.scale1
-    low = np.maximum(
-        *(
-            np.where(
-                v > 0,
-                np.abs(np.abs(u) * f - own * (w + t) * offset) + coupling * np.abs(t),
-                0.0,
-            )
-            for v, u, f, w, t in zip(
-                moving,
-                (chord.a, chord.b),
-                (part.scale0, part.scale1),
-                omega,
-                turn,
-                strict=True,
-            )
-        )
-    )
     slack = _turning_excess(part, chord, change)
-    ends = [own * (w + t) * offset for w, t in zip(omega, turn, strict=True)]
-    most = np.maximum(*ends) + slack * abs(offset)
-    least = np.minimum(*ends) - slack * abs(offset)
-    high = np.maximum(np.abs(chord.near - most), np.abs(chord.far - least))
     # Where the factor on the twist is not known from both sides: the sum of sizes.
     reach = np.maximum(np.abs(part.omega0), np.abs(part.omega1))
     reach = (reach + part.dt**2 / 8 * part.omega_ddot) * part.scale_high
-    total = chord.far * part.scale_high + abs(offset) * (reach + rate[1])
+    total = chord.far * part.scale_high + np.abs(offset) * (reach + rate[1])
     plain = (part.scale0 == 1) & (part.scale1 == 1) & (part.scale_high == 1)
-    # Without shared motors not 0 times a rate that may be infinite.
-    shared = coupling * rate[1] if coupling else 0.0
-    return low, np.where(plain, high, total) + shared
+    for own in owns:
+        rolled = (
+            np.abs(u * f - own * (w + t) * offset)
+            for u, f, w, t in zip(
+                chord.sizes, (part.scale0, part.scale1), omega, turn, strict=True
+            )
+        )
+        if coupling is not None:
+            rolled = (
+                u + coupling * np.abs(t) for u, t in zip(rolled, turn, strict=True)
+            )
+        low = np.maximum(
+            *(np.where(v > 0, u, 0.0) for v, u in zip(moving, rolled, strict=True))
+        )
+        ends = [own * (w + t) * offset for w, t in zip(omega, turn, strict=True)]
+        most = np.maximum(*ends) + slack * np.abs(offset)
+        least = np.minimum(*ends) - slack * np.abs(offset)
+        high = np.maximum(np.abs(chord.near - most), np.abs(chord.far - least))
+        high = np.where(plain, high, total)
+        yield low, high if coupling is None else high + coupling * rate[1]
 
 
 def _turning_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:
@@ -138,65 +168,99 @@ def _turning_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray
         return np.where(chord.near > 0, excess(part, slope, bend), np.inf)
 
 
-def beside_gain(
-    wheel: SteerableWheel,
-    offset: float,
+def beside_gains(
+    levers: Levers,
     part: Enclosure,
-    point: complex,
-    own: FloatArray,
+    chord: Chord,
+    change: Change,
+    swing: Bounds,
+    owns: Sequence[FloatArray],
     rolls: tuple[BoolArray, BoolArray],
-) -> Bounds:
-    """Return bounds on how fast the rolling speed of a wheel beside its axis changes.
+) -> Iterator[list[Bounds]]:
+    """Yield bounds on how fast the rolling speed of wheels beside an axis changes.
 
     ``|dû/dt| + k |α̈|``, with ``dû/dt = σ d|U|/dt - (ω̇ + α̈) D``; k for shared motors.
 
     Parameters
     ----------
-    wheel : SteerableWheel
-    offset : float, m
-        D, > 0: left of its axis.
+    levers : Levers
     part : Enclosure
-        With `Enclosure.swing`.
-    point : complex, m
-        The wheel's axis in the frame of the vehicle's file.
-    own : (m,) float
-        Sign of v_s, σ.
-    rolls : two (m,) bool
+    chord : Chord
+        Of the axes.
+    change : Change
+        Of the axes.
+    swing : (2, n, m) and (n, m) float
+        Their steering accelerations at the ends and never exceeded.
+    owns : sequence of (m,) float
+        Signs of v_s, σ.
+    rolls : two (n, m) bool
         Whether the wheel's axis moves at an end.
     """
-    assert part.swing is not None
-    chord, change = Chord.of(part, point), Change.of(part, point)
-    swung, most = part.swing.directions.accelerations(point)
+    swung, most = swing
     swing_excess = most - np.abs(swung).max(axis=0)
-    ends, counted = [], []
-    for u, d, gain, bent, does_roll in zip(
-        (chord.a, chord.b),
-        (change.a, change.b),
-        (part.omega_dot0, part.omega_dot1),
-        swung,
-        rolls,
-        strict=True,
-    ):
-        speeding = (d * u.conj()).real / np.maximum(np.abs(u), 1e-300)
-        rolled = np.abs(speeding - own * (gain + bent) * offset)
-        ends.append(rolled + wheel.steering_coupling * np.abs(bent))
-        counted.append(np.where(does_roll, ends[-1], 0.0))
-    low = np.maximum(*counted)
-    lever = abs(offset) + wheel.steering_coupling
+    speeding = [
+        (d * u.conj()).real / np.maximum(near, 1e-300)
+        for u, d, near in zip(
+            (chord.a, chord.b), (change.a, change.b), chord.sizes, strict=True
+        )
+    ]
     turned = np.maximum(np.abs(part.omega_dot0), np.abs(part.omega_dot1))
     turned_excess = excess(part, part.omega_ddot, part.omega_dddot)
-    fine = growth_excess(part, chord, change) + abs(offset) * turned_excess
-    # Where the wheel may stand there is no bound on its growth.
-    fine = np.maximum(*ends) + fine + lever * swing_excess
-    coarse = change.far + abs(offset) * (turned + turned_excess) + lever * most
-    return low, np.minimum(fine, coarse)
+    grown = growth_excess(part, chord, change)
+    gains = part.omega_dot0, part.omega_dot1
+    zero = np.zeros((len(most), 1))
+    coupling = zero if levers.coupling is None else levers.coupling
+    for each in levers.offsets:
+        offset = zero if each is None else each
+        lever, arm = np.abs(offset) + coupling, np.abs(offset)
+        fine = grown + arm * turned_excess
+        coarse = change.far + arm * (turned + turned_excess) + lever * most
+        found = []
+        for own in owns:
+            ends = [
+                np.abs(faster - own * (gain + bent) * offset) + coupling * np.abs(bent)
+                for faster, gain, bent in zip(speeding, gains, swung, strict=True)
+            ]
+            low = np.maximum(
+                *(np.where(does, n, 0.0) for does, n in zip(rolls, ends, strict=True))
+            )
+            # Where the wheel may stand there is no bound on its growth.
+            high = np.maximum(*ends) + fine + lever * swing_excess
+            found.append((low, np.minimum(high, coarse)))
+        yield found
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """What guaranteed rates ask of n wheels, (n, 1) each; see `SectorRow`."""
+
+    b: npt.NDArray[np.complex128]
+    arm: FloatArray
+    """|b|."""
+    kappa_share: FloatArray
+    beta_share: FloatArray
+    pole_arm: FloatArray
+    is_on_line: bool
+
+    @classmethod
+    def of(cls, rows: Sequence[SectorRow]) -> Zone:
+        """Return what sectors ask; all or none of a line-mobile vehicle."""
+        b = Points.of([row.b for row in rows])
+        return cls(
+            b.at,
+            b.reach,
+            column(row.kappa_share for row in rows),
+            column(row.beta_share for row in rows),
+            column(row.pole_arm for row in rows),
+            rows[0].line is not None,
+        )
 
 
 def zone_bounds(
     part: Enclosure,
-    row: SectorRow,
+    row: Zone,
     kappa_g: float,
-    reference: complex,
+    body: Chord,
     chord: Chord,
     moving: tuple[FloatArray, FloatArray],
 ) -> Bounds:
@@ -206,8 +270,7 @@ def zone_bounds(
     velocity is ``v_s (c e^{jβ} + s b)``. At a pole the worst β counts, whatever
     direction the motion takes through it. `moving` is 0 at ends where it stands.
     """
-    body = Chord.of(part, reference)
-    arm = abs(row.b)
+    arm = row.arm
     ends = [
         _asked(row, kappa_g, v, omega, u)
         for v, omega, u in (
@@ -264,7 +327,7 @@ class _End:
 
 
 def _asked(
-    row: SectorRow,
+    row: Zone,
     kappa_g: float,
     v: npt.NDArray[np.complex128],
     omega: FloatArray,
@@ -274,7 +337,7 @@ def _asked(
     share, z = v / v_s, u / v_s
     e = np.where(np.abs(share) > 0, share / np.maximum(np.abs(share), 1e-300), 1.0)
     across = np.abs((e * np.conj(row.b)).imag)
-    if row.line is not None:  # what stands off the line is slip
+    if row.is_on_line:  # what stands off the line is slip
         across = np.full_like(across, row.pole_arm)
     asked = row.kappa_share * np.where(np.abs(share) > POLE, across, row.pole_arm)
     asked = asked + row.beta_share * np.abs((share * z.conj()).real)

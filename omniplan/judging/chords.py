@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from configspace.angles import wrap
 from configspace.exact import LINE_TOLERANCE
+from omniplan.judging.points import Points
 from omniplan.judging.rows import Bounds
 from omniplan.motion import Enclosure
 
 __all__ = [
     "Change",
     "Chord",
+    "Component",
     "along",
     "changed",
     "ends_moving",
     "excess",
-    "growth",
     "growth_excess",
+    "growths",
     "off_line",
     "one_way",
     "over",
@@ -35,9 +39,12 @@ ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chord:
-    """A velocity vector over m parts, and what is derived from it more than once."""
+    """A velocity vector over m parts, and what is derived from it more than once.
+
+    Of n points at once every array is (n, m) instead of (m,).
+    """
 
     a: ComplexArray
     b: ComplexArray
@@ -48,33 +55,53 @@ class Chord:
     """At most this far from zero."""
 
     @classmethod
-    def of(cls, part: Enclosure, point: complex) -> Chord:
-        """Return the velocity of a point of the body."""
-        a = part.v0 + 1j * part.omega0 * point
-        b = part.v1 + 1j * part.omega1 * point
-        radius = part.dt**2 / 8 * (part.v_ddot + part.omega_ddot * abs(point))
+    def of(cls, part: Enclosure, point: complex | Points) -> Chord:
+        """Return the velocity of a point of the body, or of several."""
+        at, reach = _placed(point)
+        a = part.v0 + 1j * part.omega0 * at
+        b = part.v1 + 1j * part.omega1 * at
+        radius = part.dt**2 / 8 * (part.v_ddot + part.omega_ddot * reach)
         largest = np.maximum(np.abs(a), np.abs(b))
         # A segment that ends in zero must not seem to miss it by rounding.
         near = np.maximum(_distance(a, b) - radius - 1e-14 * largest, 0.0)
         return cls(a, b, radius, near, largest + radius)
 
+    @cached_property
+    def sizes(self) -> tuple[FloatArray, FloatArray]:
+        """|U| at both ends."""
+        return np.abs(self.a), np.abs(self.b)
+
+    def rows(self, rows: slice | int) -> Chord:
+        """Return those of some points, or of one."""
+        ends, reach = (self.a[rows], self.b[rows]), (self.near[rows], self.far[rows])
+        return Chord(*ends, self.radius[rows], *reach)
+
     def spread(self) -> FloatArray:
         """Return by how much a direction may stand off those of the segment, rad."""
         reach = np.where(self.near > 0, self.near + self.radius, np.inf)
-        return np.asarray(np.arcsin(np.clip(self.radius / reach, 0.0, 1.0)))
+        return np.asarray(np.arcsin(np.minimum(self.radius / reach, 1.0)))
+
+
+def _placed(
+    point: complex | Points,
+) -> tuple[complex | ComplexArray, float | FloatArray]:
+    """Return where points are and how far from the origin."""
+    if isinstance(point, Points):
+        return point.at, point.reach
+    return point, abs(point)
 
 
 def _distance(a: ComplexArray, b: ComplexArray) -> FloatArray:
     """Return the distance of the segments [a, b] from zero."""
     d = b - a
     length = np.abs(d) ** 2
-    f = np.clip(-(a * d.conj()).real / np.where(length > 0, length, 1.0), 0.0, 1.0)
-    return np.asarray(np.abs(a + f * d))
+    f = -(a * d.conj()).real / np.where(length > 0, length, 1.0)
+    return np.asarray(np.abs(a + np.minimum(np.maximum(f, 0.0), 1.0) * d))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Change:
-    """First derivative of a velocity vector over m parts."""
+    """First derivative of a velocity vector over m parts; (n, m) of n points."""
 
     a: ComplexArray
     b: ComplexArray
@@ -86,14 +113,20 @@ class Change:
     """Bound on the first derivative."""
 
     @classmethod
-    def of(cls, part: Enclosure, point: complex) -> Change:
-        """Return the derivative of the velocity of a point of the body."""
-        a = part.v_dot0 + 1j * part.omega_dot0 * point
-        b = part.v_dot1 + 1j * part.omega_dot1 * point
-        bend = part.v_ddot + part.omega_ddot * abs(point)
-        third = part.v_dddot + part.omega_dddot * abs(point)
+    def of(cls, part: Enclosure, point: complex | Points) -> Change:
+        """Return the derivative of the velocity of a point of the body, or several."""
+        at, reach = _placed(point)
+        a = part.v_dot0 + 1j * part.omega_dot0 * at
+        b = part.v_dot1 + 1j * part.omega_dot1 * at
+        bend = part.v_ddot + part.omega_ddot * reach
+        third = part.v_dddot + part.omega_dddot * reach
         far = np.maximum(np.abs(a), np.abs(b)) + excess(part, bend, third)
         return cls(a, b, bend, third, far)
+
+    def rows(self, rows: slice | int) -> Change:
+        """Return those of some points, or of one."""
+        ends, bounds = (self.a[rows], self.b[rows]), (self.bend[rows], self.third[rows])
+        return Change(*ends, *bounds, self.far[rows])
 
 
 def excess(part: Enclosure, slope: FloatArray, bend: FloatArray) -> FloatArray:
@@ -148,39 +181,60 @@ def off_line(body: Chord, own: FloatArray, line: float) -> Bounds:
     return off / LINE_TOLERANCE, off / LINE_TOLERANCE
 
 
-def _real(values: ComplexArray) -> ComplexArray:
-    """Return the real part, as complex numbers."""
-    return np.asarray(values.real, dtype=np.complex128)
+@dataclass(frozen=True, eq=False)
+class Component:
+    """The size of a component of a vector over m parts; (n, m) of n points."""
+
+    first: FloatArray
+    """At the start."""
+    last: FloatArray
+    """At the end."""
+    far: FloatArray
+    """Never exceeded."""
+
+    @property
+    def sizes(self) -> tuple[FloatArray, FloatArray]:
+        """At both ends."""
+        return self.first, self.last
 
 
-def along(chord: Chord, turn: complex) -> Chord:
-    """Return the component of a chord along ``conj(turn)``, scaled by its size."""
-    a, b = _real(chord.a * turn), _real(chord.b * turn)
-    radius = chord.radius * abs(turn)
-    far = np.maximum(np.abs(a), np.abs(b)) + radius
-    return Chord(a, b, radius, np.zeros_like(far), far)
+def along(chord: Chord, turn: complex | Points) -> Component:
+    """Return the component of a chord along ``conj(turn)``, scaled by its size.
+
+    Parameters
+    ----------
+    chord : Chord
+    turn : complex or Points
+        One direction, or one for each point of the chord.
+    """
+    towards, factor = _placed(turn)
+    first, last = (np.abs((u * towards).real) for u in (chord.a, chord.b))
+    far = np.maximum(first, last) + chord.radius * factor
+    return Component(first, last, far)
 
 
-def changed(part: Enclosure, change: Change, turn: complex) -> Change:
-    """Return the derivative of a component."""
-    a, b = _real(change.a * turn), _real(change.b * turn)
-    bend, third = change.bend * abs(turn), change.third * abs(turn)
-    far = np.maximum(np.abs(a), np.abs(b)) + excess(part, bend, third)
-    return Change(a, b, bend, third, far)
+def changed(part: Enclosure, change: Change, turn: complex | Points) -> Component:
+    """Return the derivative of a component; as `along`."""
+    towards, factor = _placed(turn)
+    first, last = (np.abs((u * towards).real) for u in (change.a, change.b))
+    bend, third = change.bend * factor, change.third * factor
+    far = np.maximum(first, last) + excess(part, bend, third)
+    return Component(first, last, far)
 
 
-def size(vector: Chord | Change) -> Bounds:
+def size(vector: Component) -> Bounds:
     """Return bounds on a length: taken at an end, never exceeded."""
-    return np.maximum(np.abs(vector.a), np.abs(vector.b)), vector.far
+    return np.maximum(vector.first, vector.last), vector.far
 
 
-def scaled(part: Enclosure, chord: Chord) -> Bounds:
+def scaled(part: Enclosure, vector: Chord | Component) -> Bounds:
     """Return the bounds of a speed with the factor on the twist."""
-    low = np.maximum(np.abs(chord.a) * part.scale0, np.abs(chord.b) * part.scale1)
-    return low, chord.far * part.scale_high
+    first, last = vector.sizes
+    low = np.maximum(first * part.scale0, last * part.scale1)
+    return low, vector.far * part.scale_high
 
 
-def over(value: Bounds, limit: float) -> Bounds:
+def over(value: Bounds, limit: float | FloatArray) -> Bounds:
     """Return the utilisation of a limit."""
     return value[0] / limit, value[1] / limit
 
@@ -197,8 +251,7 @@ def turning(
         for u, d in ((chord.a, change.a), (chord.b, change.b))
     ]
     at_ends = [
-        n / np.maximum(np.abs(u) ** 2, 1e-300)
-        for n, u in zip(ends, (chord.a, chord.b), strict=True)
+        n / np.maximum(u**2, 1e-300) for n, u in zip(ends, chord.sizes, strict=True)
     ]
     counted = (np.where(m, rate, 0.0) for m, rate in zip(rolls, at_ends, strict=True))
     low = np.maximum(*counted)
@@ -236,28 +289,43 @@ def growth_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:
         return np.where(chord.near > 0, excess(part, slope, bend), np.inf)
 
 
-def growth(part: Enclosure, chord: Chord, change: Change, side: int) -> Bounds:
-    """Return bounds on d|U|/dt; `side` 1 only growth, -1 only decline, 0 both.
+def growths(
+    part: Enclosure, chord: Chord, change: Change, sides: Sequence[int]
+) -> list[Bounds]:
+    """Return bounds on d|U|/dt; a side 1 only growth, -1 only decline, 0 both.
 
     With r = |U|: ``ṙ = Re(U̇ Ū)/r``, ``|r̈| ≤ |Ü| + |U̇|²/r`` and ``|r⃛| ≤ |U⃛| +
     6 |Ü| |U̇|/r + 3 |U̇|³/r²``.
     """
     ends = [(d * u.conj()).real for u, d in ((chord.a, change.a), (chord.b, change.b))]
-    sizes = np.abs(chord.a), np.abs(chord.b)
-    weigh = np.abs if side == 0 else lambda x: np.maximum(side * x, 0.0)
-    reached = [
-        weigh(n) / np.maximum(s, 1e-300) for n, s in zip(ends, sizes, strict=True)
-    ]
-    low = np.maximum(*(r * (s > 1e-9) for r, s in zip(reached, sizes, strict=True)))
     # d/dt Re(U̇ Ū) = Re(Ü Ū) + |U̇|²; and never more than |U̇|.
     more = part.dt / 2 * (change.bend * chord.far + change.far**2)
+    bent = growth_excess(part, chord, change)
+    return [_growth(part, chord, change, ends, more, bent, side) for side in sides]
+
+
+def _growth(
+    part: Enclosure,
+    chord: Chord,
+    change: Change,
+    ends: list[FloatArray],
+    more: FloatArray,
+    bent: FloatArray,
+    side: int,
+) -> Bounds:
+    sizes = chord.sizes
+    weighed = [np.abs(n) if side == 0 else np.maximum(side * n, 0.0) for n in ends]
+    reached = [n / np.maximum(s, 1e-300) for n, s in zip(weighed, sizes, strict=True)]
+    low = np.maximum(*(r * (s > 1e-9) for r, s in zip(reached, sizes, strict=True)))
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        steep = (np.maximum(*(weigh(n) for n in ends)) + more) / chord.near
-        bent = np.maximum(*reached) + growth_excess(part, chord, change)
+        steep = (np.maximum(*weighed) + more) / chord.near
+        bent = np.maximum(*reached) + bent
         steep = np.where(chord.near > 0, np.fmin(steep, bent), np.inf)
     high = np.minimum(steep, change.far)
+    if side == 0:
+        return low, high
     # Into rest |U| only declines, out of rest it only grows, while U̇ keeps its way.
     still = sizes[1 if side > 0 else 0] <= 1e-9
     pull = np.abs(change.b if side > 0 else change.a)
-    lull = still & (pull > 2 * part.dt * change.bend) & (side != 0)
+    lull = still & (pull > 2 * part.dt * change.bend)
     return low, np.where(lull, low, high)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from configspace import PermissibleSpace
+from functools import lru_cache
+
+from configspace import PermissibleSpace, Vehicle
 from configspace.sheet import fingerprint
 from omniplan.judging.rows import Judge, Tolerances
 from omniplan.judging.sheet_judge import SheetJudge
@@ -27,10 +29,21 @@ def judge_for(space: PermissibleSpace, motion: Motion, tolerances: Tolerances) -
     """Return the exact judge if the vehicle is known, else that of the data sheet."""
     if space.vehicle is None:
         return SheetJudge(space, tolerances, is_own=motion.is_own)
+    has_swing = isinstance(motion, PoseMotion)
+    return _vehicle_judge(
+        space.vehicle, tolerances, motion.is_own, motion.has_rates, has_swing
+    )
+
+
+@lru_cache(maxsize=64)
+def _vehicle_judge(
+    vehicle: Vehicle,
+    tolerances: Tolerances,
+    is_own: bool,
+    has_rates: bool,
+    has_swing: bool,
+) -> VehicleJudge:
+    """Return a judge, which keeps nothing of what it judges."""
     return VehicleJudge(
-        space.vehicle,
-        tolerances,
-        is_own=motion.is_own,
-        has_rates=motion.has_rates,
-        has_swing=isinstance(motion, PoseMotion),
+        vehicle, tolerances, is_own=is_own, has_rates=has_rates, has_swing=has_swing
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -140,6 +141,9 @@ class Proof:
         judge: Judge,
         tolerances: Tolerances,
         max_parts: int | None = None,
+        *,
+        cuts: Sequence[BoolArray] = (),
+        checkpoint: Callable[[], None] | None = None,
     ) -> None:
         """Take a motion and who judges it.
 
@@ -150,6 +154,11 @@ class Proof:
         tolerances : Tolerances
         max_parts : int, optional
             How many more parts there may be than the motion has intervals.
+        cuts : sequence of (m,) bool
+            Which parts are halved to begin with, one after the other: `cuts` of a proof
+            of the same motion at another speed.
+        checkpoint : callable, optional
+            Called before parts are judged; what it raises ends the proof.
         """
         self._max_parts = MAX_PARTS if max_parts is None else max_parts
         self._motion, self._judge, self._tolerances = motion, judge, tolerances
@@ -158,21 +167,38 @@ class Proof:
         self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
         self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
         self._is_shape = np.array([row.scaling == "none" for row in judge.rows])
-        spans = motion.intervals()
+        self._checkpoint = checkpoint
+        spans = self._whole = motion.intervals()
         self._step = spans.t1 - spans.t0
-        self.first = self.parts = self._evaluate(spans)
+        self.cuts: list[BoolArray] = []
+        """Which parts were halved, one after the other."""
+        if cuts and cuts[0].size == spans.t0.size:
+            self.cuts += cuts
+        for need in self.cuts:
+            spans = spans.halved(need)
+        self.parts = self._evaluate(spans)
+        if not self.cuts:
+            self.first = self.parts
+
+    @cached_property
+    def first(self) -> Parts:
+        """The intervals of the motion, uncut."""
+        return self._evaluate(self._whole)
 
     def _evaluate(self, spans: Intervals) -> Parts:
+        if self._checkpoint is not None:
+            self._checkpoint()
         part = self._motion.enclose(spans)
         body = Chord.of(part, self._judge.reference)
         speed = speed_of(part, body, self._judge.kappa_g)[1] * part.scale_high
         stands = (speed <= self._tolerances.standstill) & (not self._motion.is_own)
         low, high = {}, {}
-        for sign in self.signs:
-            low[sign], high[sign] = self._judge.utilisation(part, sign)
+        for sign, bounds in self._judge.utilisations(part, self.signs).items():
+            low[sign], high[sign] = bounds
             # At rest the wheels may stand anyhow; how they turn is judged apart.
-            for bounds in (low[sign], high[sign]):
-                bounds[np.ix_(stands, self._free_at_rest)] = 0.0
+            if stands.any():
+                for each in bounds:
+                    each[np.ix_(stands, self._free_at_rest)] = 0.0
         return Parts(spans, part, stands, low, high)
 
     def decide(self) -> None:
@@ -261,6 +287,7 @@ class Proof:
             more = need.size + np.count_nonzero(need) - self._step.size
             if not need.any() or more > self._max_parts:
                 return
+            self.cuts.append(need)
             self.parts = self._halved(need)
 
     def _halved(self, need: BoolArray) -> Parts:

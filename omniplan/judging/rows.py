@@ -7,6 +7,7 @@ whole part, so ``high ≤ 1`` proves that the limit is kept all along it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
@@ -101,4 +102,8 @@ class Judge(Protocol):
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
         """Return low and high utilisation, (m, rows), of representation `sign`."""
+        ...
+
+    def utilisations(self, part: Enclosure, signs: Sequence[int]) -> dict[int, Bounds]:
+        """Return low and high utilisation, (m, rows), of every representation."""
         ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +44,10 @@ class SheetJudge:
             sine = math.sin(tolerances.slip_angle)
             rows.append(Row("FIXED_WHEEL", -1, sine, "1", "none"))
         self.rows: tuple[Row, ...] = tuple(rows)
+
+    def utilisations(self, part: Enclosure, signs: Sequence[int]) -> dict[int, Bounds]:
+        """Return low and high utilisation, (m, rows), of every representation."""
+        return {sign: self.utilisation(part, sign) for sign in signs}
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
         """Return low and high utilisation, (m, rows), of representation `sign`."""

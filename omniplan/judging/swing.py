@@ -22,6 +22,7 @@ directions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -29,7 +30,16 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Directions", "Swing", "directions_of_legs", "factored", "swinging"]
+from omniplan.judging.points import Points
+
+__all__ = [
+    "Directions",
+    "Pieces",
+    "Swing",
+    "directions_of_legs",
+    "factored",
+    "swinging",
+]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -58,10 +68,17 @@ class Directions:
     omega_most: FloatArray
     """(4, m)."""
 
-    def _of(self, point: complex) -> tuple[ComplexArray, FloatArray]:
-        """Return the ends, and bounds on |L_1| to |L_4|; infinite if unknown."""
-        d = self.v + 1j * self.omega * point
-        most = self.v_most + self.omega_most * abs(point)
+    def _of(self, point: complex | Points) -> tuple[ComplexArray, FloatArray]:
+        """Return the ends, and bounds on |L_1| to |L_4|; infinite if unknown.
+
+        Of several points there is one more axis, before that of the parts.
+        """
+        if isinstance(point, Points):
+            d = self.v[:, :, None] + 1j * self.omega[:, :, None] * point.at
+            most = self.v_most[:, None] + self.omega_most[:, None] * point.reach
+        else:
+            d = self.v + 1j * self.omega * point
+            most = self.v_most + self.omega_most * abs(point)
         # Where v and jωr cancel, near the centre of rotation, the ends tell more.
         at_ends, bent = np.abs(d).max(axis=1), self.dt**2 / 8
         for order in (2, 1):
@@ -71,7 +88,7 @@ class Directions:
         chord = end - start
         length = np.abs(chord) ** 2
         f = -(start * chord.conj()).real / np.where(length > 0, length, 1.0)
-        nearest = np.abs(start + np.clip(f, 0.0, 1.0) * chord)
+        nearest = np.abs(start + np.minimum(np.maximum(f, 0.0), 1.0) * chord)
         largest = np.maximum(np.abs(start), np.abs(end))
         near = nearest - self.dt**2 / 8 * most[1] - 1e-14 * largest
         with np.errstate(over="ignore"):
@@ -95,15 +112,15 @@ class Directions:
         excess = self._least(bend, third)
         return ends, np.abs(ends).max(axis=0) + excess
 
-    def accelerations(self, point: complex) -> tuple[FloatArray, FloatArray]:
+    def accelerations(self, point: complex | Points) -> tuple[FloatArray, FloatArray]:
         """Return α̈ of the direction of a point at both ends, (2, m), and a bound.
 
         An end at which the point stands counts 0; the bound is infinite there.
 
         Parameters
         ----------
-        point : complex, m
-            In the frame of the vehicle's file.
+        point : complex or Points, m
+            In the frame of the vehicle's file; of n points it is (2, n, m) and (n, m).
         """
         d, l_ = self._of(point)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -127,37 +144,42 @@ class Directions:
 
 
 @dataclass(frozen=True, eq=False)
+class Pieces:
+    """k cubic splines of position and heading, over a real factor."""
+
+    speed: ComplexArray
+    """(4, k): p' over the factor, coefficients of h², h, 1 and 1 / τ."""
+    turn: FloatArray
+    """(4, k): θ' over the same factor."""
+    since: FloatArray
+    """(k,) s: ``τ = since + h``; infinite where the last coefficients are 0."""
+    heading: FloatArray
+    """(4, k): θ."""
+    point: complex
+    """The described point in the frame of the vehicle's file, m."""
+
+
+@dataclass(frozen=True, eq=False)
 class Swing:
-    """m parts of cubic splines of position and heading; worked out when asked for."""
+    """m parts of splines of position and heading; worked out when asked for."""
 
     dt: FloatArray
     """(m,) s."""
     h: FloatArray
     """(2, m) s: the ends, since the sample before."""
-    speed: ComplexArray
-    """(4, m): p' over a real factor, coefficients of h², h, 1 and 1 / τ."""
-    turn: FloatArray
-    """(4, m): θ' over the same factor."""
-    since: FloatArray
-    """(m,) s: ``τ = since + h``; infinite where the last coefficients are 0."""
-    heading: FloatArray
-    """(4, m): θ."""
-    point: complex
-    """The described point in the frame of the vehicle's file, m."""
+    knot: IntArray
+    """(m,) the spline each part belongs to."""
+    pieces: Callable[[], Pieces]
+    """Gives the splines."""
 
-    @classmethod
-    def nothing(cls) -> Swing:
-        """Return no parts at all."""
-        none, pair = np.zeros(0), np.zeros((2, 0))
-        speed = np.zeros((4, 0), dtype=np.complex128)
-        return cls(none, pair, speed, np.zeros((4, 0)), none, np.zeros((4, 0)), 0j)
+    def rows(self, rows: slice) -> Swing:
+        """Return some of the parts."""
+        return Swing(self.dt[rows], self.h[:, rows], self.knot[rows], self.pieces)
 
     def only(self, end: int) -> Swing:
         """Return the parts shrunk to one of their ends, 0 or 1."""
         h = np.stack([self.h[end], self.h[end]])
-        zero = np.zeros_like(self.dt)
-        held = self.speed, self.turn, self.since, self.heading, self.point
-        return Swing(zero, h, *held)
+        return Swing(np.zeros_like(self.dt), h, self.knot, self.pieces)
 
     def merged(self, others: Swing, order: IntArray) -> Swing:
         """Return parts of both: these and then the others, in a new order.
@@ -165,25 +187,25 @@ class Swing:
         Parameters
         ----------
         others : Swing
-            Of the same point.
+            Of the same splines.
         order : (n,) int
             Indices into all of them.
         """
-        names = "dt", "h", "speed", "turn", "since", "heading"
-        fields = {
-            name: np.concatenate([getattr(self, name), getattr(others, name)], axis=-1)
-            for name in names
-        }
-        picked = {name: values[..., order] for name, values in fields.items()}
-        return Swing(**picked, point=self.point)
+        return Swing(
+            np.concatenate([self.dt, others.dt])[order],
+            np.concatenate([self.h, others.h], axis=1)[:, order],
+            np.concatenate([self.knot, others.knot])[order],
+            self.pieces,
+        )
 
     @cached_property
     def directions(self) -> Directions:
         """The twist over the factor, ``e^{-jθ} P - j Q r`` and ``Q``."""
-        h, dt, r = self.h, self.dt, self.point
-        p0, p1, p2, s3, s4 = _divided(self.speed, self.since, h)
-        q0, q1, q2, o3, o4 = _divided(self.turn, self.since, h)
-        a, b, c, d = self.heading[:, None, :]
+        pieces, k = self.pieces(), self.knot
+        h, dt, r, since = self.h, self.dt, pieces.point, pieces.since[k]
+        p0, p1, p2, s3, s4 = _divided(pieces.speed[:, k], since, h)
+        q0, q1, q2, o3, o4 = _divided(pieces.turn[:, k], since, h)
+        a, b, c, d = pieces.heading[:, None, k]
         t0, t1 = ((a * h + b) * h + c) * h + d, (3 * a * h + 2 * b) * h + c
         t2, t3 = 6 * a * h + 2 * b, np.abs(6 * a[0])
         # d/dt e^{-jθ} = -jθ' e^{-jθ}, and so on
@@ -265,7 +287,7 @@ def factored(
     Returns
     -------
     divided : (4, m)
-        As of `Swing.speed`; the derivative is this times ``h``, ``h - span``, both, τ
+        As of `Pieces.speed`; the derivative is this times ``h``, ``h - span``, both, τ
         or 1.
     """
     a, b, c = 3 * cubic[0], 2 * cubic[1], cubic[2]

@@ -199,11 +199,8 @@ def find_violations(
             is_proved = bool((reached > 1 + ROUNDING).any())
             ranked = reached if is_proved else high[run, column]
             part = int(run[int(np.argmax(ranked))])
-            ends = [
-                describer.place(parts, part, tail, int(sign[part]))
-                for tail in (False, True)
-            ]
-            place = ends[int(at_end[part, column])]
+            tail = bool(at_end[part, column])
+            place = describer.place(parts, part, tail, int(sign[part]))
             span = float(parts.spans.t0[run[0]]), float(parts.spans.t1[run[-1]])
             ratio = float(ranked.max())
             angle = None
@@ -246,8 +243,7 @@ def reconfiguration_violations(
     """
     describer = _Describer(judge, trajectory, motion, space)
     for stop in choice.standstills:
-        there_is = stop.t1 - stop.t0
-        if stop.change.time <= there_is:
+        if not stop.is_short:
             continue
         t = (stop.t0 + stop.t1) / 2
         kappa_n, beta = stop.change.start
@@ -256,7 +252,7 @@ def reconfiguration_violations(
             limit="RECONFIGURATION",
             wheel=judge.wheel_ids[wheel] if wheel >= 0 else None,
             value=stop.change.time if math.isfinite(stop.change.time) else None,
-            bound=there_is,
+            bound=stop.t1 - stop.t0,
             unit="s",
             index=int(np.searchsorted(trajectory.t, t, side="right")) - 1,
             t=t,
@@ -333,7 +329,7 @@ def _worse_at_end(
 def _bounds(
     judge: Judge, part: Enclosure
 ) -> tuple[dict[int, FloatArray], dict[int, FloatArray]]:
-    found = {sign: judge.utilisation(part, sign) for sign in (1, -1)}
+    found = judge.utilisations(part, (1, -1))
     return ({s: b[0] for s, b in found.items()}, {s: b[1] for s, b in found.items()})
 
 

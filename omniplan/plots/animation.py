@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +16,7 @@ from matplotlib.patches import Polygon
 from PIL import Image
 
 from configspace import InvalidInput, Problem
+from configspace.files import reason_of, whole_file
 from omniplan.plots.plan_data import Film, film_of
 from omniplan.plots.plans import SWEPT, draw_scene, numbers_of, panels
 from omniplan.plots.style import GOAL, PATH, START
@@ -160,21 +158,18 @@ def _write(frames: Sequence[Image.Image], path: Path) -> None:
     ]
     each = round(1000 / FRAMES_PER_SECOND)
     durations = [each] * (len(small) - 1) + [each + round(1000 * HOLD)]
-    temporary = path.with_name(f".{path.stem[:100]}.{secrets.token_hex(8)}.gif")
     try:
-        small[0].save(
-            temporary,
-            save_all=True,
-            append_images=small[1:],
-            duration=durations,
-            loop=0,
-            optimize=False,
-        )
-        os.replace(temporary, path)
+        with whole_file(path) as temporary:
+            small[0].save(
+                temporary,
+                format="GIF",
+                save_all=True,
+                append_images=small[1:],
+                duration=durations,
+                loop=0,
+                optimize=False,
+            )
     except OSError as error:
         raise InvalidInput(
-            Problem("path", f"{path}: {error.strerror or error}", "must be writable")
+            Problem("path", f"{path}: {reason_of(error)}", "must be writable")
         ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from configspace import OmniplanError
     from omniplan.choosing.fitness import Suitability
     from omniplan.report import Ranking, Report
     from omniplan.timing.result import Timing
@@ -25,14 +26,46 @@ __all__ = [
     "answer_reports",
     "answer_suitability",
     "answer_timed",
+    "code_of",
+    "complain",
     "open_console",
     "print_json",
+    "print_names",
     "progress_console",
     "say",
     "say_written",
 ]
 
 YES, NO, BAD_INPUT, FAILURE = 0, 1, 2, 3
+
+ASKED_WRONGLY = {
+    "invalid_input",
+    "invalid_message",
+    "invalid_trajectory",
+    "invalid_vehicle",
+    "no_vehicle_file",
+    "too_large",
+    "unknown_vehicle",
+}
+"""Codes by which a server says what is bad input here."""
+
+
+def code_of(error: OmniplanError) -> int:
+    """Return the exit code of an error: bad input or failure."""
+    from configspace import InvalidInput
+
+    is_input = isinstance(error, InvalidInput)
+    return (
+        BAD_INPUT if is_input or vars(error).get("code") in ASKED_WRONGLY else FAILURE
+    )
+
+
+def complain(error: Exception, as_json: bool) -> None:
+    """Print an error, on standard output where JSON is read there."""
+    if as_json:
+        print(json.dumps({"error": type(error).__name__, "message": str(error)}))
+    else:
+        print(f"omniplan: {error}", file=sys.stderr)
 
 
 def answer_timed(
@@ -120,6 +153,14 @@ def say_written(path: Path, as_json: bool) -> None:
         print_json({"output": str(path)})
     else:
         print(f"wrote {path}")
+
+
+def print_names(names: Sequence[str], as_json: bool) -> None:
+    """Print names, one a line or as JSON."""
+    if as_json:
+        print_json(list(names))
+    else:
+        print("\n".join(names))
 
 
 def print_json(data: object) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from omniplan.shell import answers, loading
+from omniplan.shell.writing import make_folder, require_file
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -101,7 +102,7 @@ def _scenario(options: argparse.Namespace) -> int:
 
     task = scenario(options.scenario)
     if options.out is not None:
-        _make_folder("--out", options.out)
+        make_folder("--out", options.out)
     solutions = list(_solved(task, options))
     written = []
     if options.out is not None:
@@ -165,7 +166,7 @@ def _vehicle(options: argparse.Namespace) -> int:
         bounds = _numbers("--bounds", options.bounds, 4, form)
     obstacles = _obstacles(options)
     if options.out is not None:
-        _require_writable(options.out)
+        require_file("--out", options.out, ".csv", ".parquet")
     space = loading.space_of(options.vehicle)
     with answers.progress_console().status("Planning"):
         found = find(
@@ -200,7 +201,7 @@ def _drawn(solution: Solution, folder: Path) -> Iterator[Path]:
     from omniplan.plots.pictures import plot_report
     from omniplan.plots.plans import plot_plans
 
-    _make_folder("--plot", folder)
+    make_folder("--plot", folder)
     path = folder / f"plan-{solution.vehicle}.png"
     save_figure(plot_plans([solution]), path)
     yield path
@@ -236,26 +237,6 @@ def _numbers(where: str, text: str, n: int, allowed: str) -> tuple[float, ...]:
     if len(values) != n or not all(map(math.isfinite, values)):
         raise InvalidInput(Problem(where, text, allowed))
     return values
-
-
-def _make_folder(where: str, folder: Path) -> None:
-    """Make a folder before the work is done, or raise."""
-    from configspace import InvalidInput, Problem
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        given = f"{folder}: {error.strerror}"
-        raise InvalidInput(Problem(where, given, "a folder")) from error
-
-
-def _require_writable(path: Path) -> None:
-    from configspace import InvalidInput, Problem
-
-    if path.suffix.lower() not in {".csv", ".parquet"}:
-        raise InvalidInput(Problem("--out", str(path), "must end in .csv or .parquet"))
-    if not path.parent.is_dir():
-        raise InvalidInput(Problem("--out", str(path), "the folder must exist"))
 
 
 def _table(title: str, solutions: Sequence[Solution]) -> Table:

@@ -9,8 +9,9 @@ followed throughout: how often each has turned at the start is chosen as well.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +58,11 @@ class Standstill:
     t0: float
     t1: float
     change: Reconfiguration
+
+    @property
+    def is_short(self) -> bool:
+        """Whether there is less time than the wheels need."""
+        return self.change.time > self.t1 - self.t0
 
 
 @dataclass(frozen=True)
@@ -150,11 +156,14 @@ def choose_configurations(
     parts, pieces = proof.parts, proof.parts.pieces()
     if not pieces:
         return Choice((1,), ())
-    lost = {
-        (i, sign): not allow_unreachable and is_apart(parts, piece, sign, judge, space)
-        for i, piece in enumerate(pieces)
-        for sign in proof.signs
-    }
+
+    @cache
+    def lost(i: int, sign: int) -> bool:
+        """Return whether a piece is refused for where it lies."""
+        if allow_unreachable:
+            return False
+        return is_apart(parts, pieces[i], sign, judge, space)
+
     if not judge.needs_configuration:
         return Choice(
             (1,), (), (), _apart(parts, pieces, [1] * len(pieces), judge, lost)
@@ -174,7 +183,7 @@ def _options(
     proof: Proof,
     judge: Judge,
     pieces: Sequence[Piece],
-    lost: dict[tuple[int, int], bool],
+    lost: Callable[[int, int], bool],
     sweeps: Sequence[tuple[Sweep, ...]],
 ) -> list[dict[int, _Option]]:
     """Return the representations of every piece that are worth a look.
@@ -186,16 +195,20 @@ def _options(
     faults = {s: refused(parts.low[s], parts.high[s], judge.rows) for s in proof.signs}
     for i, (piece, swept) in enumerate(zip(pieces, sweeps, strict=True)):
         rows = slice(piece.first, piece.last + 1)
-        costs = {
-            sign: float(
-                faults[sign][rows].any(axis=0).sum() + lost[i, sign] * UNREACHABLE
-            )
-            for sign in proof.signs
-        }
+        broken = {s: float(faults[s][rows].any(axis=0).sum()) for s in proof.signs}
+        costs: dict[int, float] = {}
+        for sign in sorted(broken, key=broken.__getitem__):
+            # Where it lies takes time to find out, and may not matter any more.
+            if broken[sign] <= min(costs.values(), default=np.inf):
+                costs[sign] = broken[sign] + lost(i, sign) * UNREACHABLE
         least = min(costs.values())
         turned = {1: swept, -1: tuple(sweep.opposite() for sweep in swept)}
         options.append(
-            {s: _Option(cost, turned[s]) for s, cost in costs.items() if cost == least}
+            {
+                s: _Option(costs[s], turned[s])
+                for s in proof.signs
+                if costs.get(s) == least
+            }
         )
     return options
 
@@ -333,7 +346,7 @@ def _apart(
     pieces: Sequence[Piece],
     signs: Sequence[int],
     judge: Judge,
-    lost: dict[tuple[int, int], bool],
+    lost: Callable[[int, int], bool],
 ) -> tuple[Apart, ...]:
     return tuple(
         Apart(
@@ -342,7 +355,7 @@ def _apart(
             _configuration(parts, piece.first, sign, judge, at_end=True),
         )
         for i, (piece, sign) in enumerate(zip(pieces, signs, strict=True))
-        if lost[i, sign]
+        if lost(i, sign)
     )
 
 

@@ -62,8 +62,15 @@ class _ShapeJudge:
 
     def utilisation(self, part: Enclosure, sign: int) -> Bounds:
         """Return low and high utilisation of the rows kept, (m, rows)."""
-        low, high = self._judge.utilisation(part, sign)
-        return low[:, self._kept], high[:, self._kept]
+        return self.utilisations(part, (sign,))[sign]
+
+    def utilisations(self, part: Enclosure, signs: Sequence[int]) -> dict[int, Bounds]:
+        """Return those of several representations."""
+        found = self._judge.utilisations(part, signs)
+        return {
+            sign: (low[:, self._kept], high[:, self._kept])
+            for sign, (low, high) in found.items()
+        }
 
 
 def shape_of(

@@ -33,6 +33,9 @@ Choose = Callable[[Sequence[str] | None], Sequence[PermissibleSpace]]
 
 TURN = 0.02
 """After so long others have their turn, s."""
+FIRST = 1 << 16
+"""Samples times vehicles of the first part: about two turns. Cut smaller, the kernels
+have too little to do at once, and each part costs a millisecond besides."""
 MAX_PAIRS = 1 << 16
 """Rows of one part: its size stays in the order of a megabyte."""
 TWISTS = 1 << 18
@@ -57,7 +60,8 @@ def validate_batch(
     trajectories = yield from _read_in_turns(table, vehicle)
     batch = Batch(trajectories, spaces, allow_unreachable=request.allow_unreachable)
     parts = _Numbered(batch.pairs, fleet_digest(spaces), request.request)
-    size = 1
+    mean = table.num_rows / len(trajectories)
+    size = max(1, round(FIRST / (mean * max(len(spaces), 1))))
     start = asked = 0
     while start < len(trajectories):
         began = time.perf_counter()
@@ -114,8 +118,8 @@ def _read_in_turns(
 
 
 def _next_size(size: int, took: float, n_vehicles: int) -> int:
-    """Return how many trajectories the next part has, so that it takes about a turn."""
-    wanted = size * min(max(TURN / max(took, 1e-6), 0.25), 2.0)
+    """Return how many trajectories the next part has: about two turns of work."""
+    wanted = size * min(max(2 * TURN / max(took, 1e-6), 0.25), 2.0)
     return max(1, min(round(wanted), MAX_PAIRS // max(n_vehicles, 1)))
 
 

@@ -163,7 +163,11 @@ class Handlers:
         for index, trajectory in enumerate(trajectories):
             if index:
                 yield None
-            reports.append(validate(trajectory, space, allow_unreachable=allow))
+            reports.append(
+                validate(
+                    trajectory, space, allow_unreachable=allow, checkpoint=call.check
+                )
+            )
         return Answer(encode(ValidateReply.of(reports)))
 
     def select(self, payload: bytes, call: Call) -> Parts:
@@ -180,6 +184,7 @@ class Handlers:
             request.by,
             requirements=request.requirements,
             allow_unreachable=request.allow_unreachable,
+            checkpoint=call.check,
         )
         rankings: list[Ranking] = []
         for index, trajectory in enumerate(trajectories):

@@ -11,11 +11,13 @@ import os
 import threading
 from bisect import bisect_left
 from collections import Counter
-from dataclasses import dataclass
+from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
-__all__ = ["Histogram", "KeyFigures", "Metrics", "resident_bytes"]
+from services.protocol.messages import KeyHealth
+
+__all__ = ["Histogram", "Metrics", "resident_bytes"]
 
 FIRST = 1e-5
 """Upper edge of the first bin, s."""
@@ -23,6 +25,8 @@ PER_DECADE = 20
 """Bins in which latencies grow tenfold: neighbouring edges are 12 % apart."""
 N_BINS = 8 * PER_DECADE + 2
 """From 10 µs to 1000 s; the first and the last are open."""
+EDGES = (*(FIRST * 10.0 ** (i / PER_DECADE) for i in range(N_BINS - 1)), math.inf)
+"""Upper edges of the bins, s."""
 
 
 class Histogram:
@@ -33,6 +37,7 @@ class Histogram:
 
     def __init__(self) -> None:
         self._counts = [0] * N_BINS
+        self._used = N_BINS, -1  # the first and the last bin with a count
         self._n = 0
         self._largest = 0.0
 
@@ -42,7 +47,11 @@ class Histogram:
 
     def add(self, value: float) -> None:
         """Count a number."""
-        self._counts[_bin(value)] += 1
+        index = bisect_left(EDGES, value)
+        first, last = self._used
+        if not first <= index <= last:
+            self._used = min(first, index), max(last, index)
+        self._counts[index] += 1
         self._n += 1
         self._largest = max(self._largest, value)
 
@@ -65,24 +74,13 @@ class Histogram:
         """Return the quantiles for several shares."""
         if not self._n:
             return (0.0,) * len(shares)
-        seen = list(accumulate(self._counts))
-        ranks = (max(1, math.ceil(q * self._n)) for q in shares)
-        bins = (bisect_left(seen, rank) for rank in ranks)
-        return tuple(min(_upper_edge(index), self._largest) for index in bins)
-
-
-@dataclass(frozen=True)
-class KeyFigures:
-    """What was counted for one kind of key."""
-
-    codes: dict[str, int]
-    """Answers by code, ``ok`` among them."""
-    p50: float
-    """Latency from arrival to the last reply that half of all do not exceed, s."""
-    p90: float
-    """Likewise for nine of ten, s."""
-    p99: float
-    """Likewise for 99 of 100, s."""
+        first, last = self._used
+        seen = list(accumulate(self._counts[first : last + 1]))
+        found = []
+        for share in shares:
+            place = first + bisect_left(seen, max(1, math.ceil(share * self._n)))
+            found.append(min(EDGES[place], self._largest))
+        return tuple(found)
 
 
 class Metrics:
@@ -92,6 +90,8 @@ class Metrics:
         self._lock = threading.Lock()
         self._codes: dict[str, Counter[str]] = {}
         self._times: dict[str, Histogram] = {}
+        self._figures: dict[str, KeyHealth] = {}
+        """Of the kinds that nothing was counted for since they were asked for."""
 
     def count(self, kind: str, code: str, seconds: float) -> None:
         """Count one answer.
@@ -105,44 +105,34 @@ class Metrics:
             From arrival to the last reply.
         """
         with self._lock:
-            self._codes.setdefault(kind, Counter())[code] += 1
-            self._times.setdefault(kind, Histogram()).add(seconds)
+            if kind not in self._codes:
+                self._codes[kind], self._times[kind] = Counter(), Histogram()
+            self._codes[kind][code] += 1
+            self._times[kind].add(seconds)
+            self._figures.pop(kind, None)
 
-    def figures(self) -> dict[str, KeyFigures]:
+    def figures(self) -> dict[str, KeyHealth]:
         """Return what was counted, by kind of key."""
         with self._lock:
-            return {
-                kind: KeyFigures(
-                    dict(self._codes[kind]),
-                    *self._times[kind].quantiles(0.5, 0.9, 0.99),
+            for kind in self._codes.keys() - self._figures.keys():
+                p50, p90, p99 = self._times[kind].quantiles(0.5, 0.9, 0.99)
+                self._figures[kind] = KeyHealth(
+                    codes=dict(self._codes[kind]), p50=p50, p90=p90, p99=p99
                 )
-                for kind in sorted(self._codes)
-            }
+            return {kind: self._figures[kind] for kind in sorted(self._figures)}
 
 
 def resident_bytes(statm: str | Path = "/proc/self/statm") -> int | None:
     """Return the memory this process holds, bytes; None where it is not known."""
     try:
-        # Half of what `health` takes, if read through layers of text and buffers.
-        with open(statm, "rb", buffering=0) as file:
-            pages = int(file.read(200).split()[1])
+        # The path means another file in a process that was forked.
+        pages = int(os.pread(_opened(statm, os.getpid()), 200, 0).split()[1])
     except (OSError, ValueError, IndexError):  # no Linux
         return None
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def _bin(value: float) -> int:
-    if not value > FIRST:
-        return 0
-    # The bin whose upper edge is the first that is not below the value; rounding up
-    # to the next bin where the logarithm is not exact keeps that.
-    index = math.ceil(PER_DECADE * math.log10(value / FIRST)) if value < 1e9 else N_BINS
-    if index < N_BINS - 1 and value > _upper_edge(index):
-        index += 1
-    return min(index, N_BINS - 1)
-
-
-def _upper_edge(index: int) -> float:
-    if index >= N_BINS - 1:
-        return math.inf
-    return FIRST * math.pow(10.0, index / PER_DECADE)
+@cache
+def _opened(path: str | Path, process: int) -> int:
+    """Return the descriptor of a file that stays open: to open it takes longest."""
+    return os.open(path, os.O_RDONLY)

@@ -16,7 +16,7 @@ from configspace.space import PermissibleSpace
 from services.answering.cores import large_at_once
 from services.answering.dispatch import Dispatcher
 from services.answering.handlers import Handlers
-from services.answering.metrics import KeyFigures, resident_bytes
+from services.answering.metrics import resident_bytes
 from services.answering.upkeep import Upkeep
 from services.answering.workers import PoolLimits
 from services.errors import ServiceError
@@ -28,7 +28,7 @@ from services.guarding.security import (
 )
 from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
 from services.protocol.keys import Keys
-from services.protocol.messages import Health, KeyHealth, RequestLimits
+from services.protocol.messages import Health, RequestLimits
 from services.registering.registry import Registry
 from services.wire.session import Peer
 
@@ -105,7 +105,7 @@ class Server:
         *,
         site: str = "default",
         listen: str = DEFAULT_ENDPOINT,
-        workers: int = 2,
+        workers: int = 3,
         queue_size: int = 64,
         max_bytes: int = 8 * 2**20,
         max_samples: int = 100_000,
@@ -134,7 +134,11 @@ class Server:
                 Problem("stop_within", f"{stop_within} s", "finite, not negative")
             )
         self._pool_limits = PoolLimits(
-            workers, queue_size, queue_bytes, large_at_once(workers)
+            workers,
+            queue_size,
+            queue_bytes,
+            n_large=large_at_once(workers, is_alone=False),
+            n_large_alone=large_at_once(workers, is_alone=True),
         )
         self._stop_within = stop_within
         limits = RequestLimits(
@@ -269,7 +273,8 @@ class Server:
             errors=0 if at_work is None else at_work.n_errors,
             uptime=time.monotonic() - self._started_at,
             memory=resident_bytes(),
-            keys={} if at_work is None else _key_health(at_work.metrics.figures()),
+            sheet_bytes=self._registry.snapshot.n_bytes,
+            keys={} if at_work is None else at_work.metrics.figures(),
         )
 
     def _online(self) -> frozenset[str]:
@@ -288,10 +293,3 @@ class Server:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def _key_health(figures: dict[str, KeyFigures]) -> dict[str, KeyHealth]:
-    return {
-        kind: KeyHealth(codes=found.codes, p50=found.p50, p90=found.p90, p99=found.p99)
-        for kind, found in figures.items()
-    }

@@ -13,11 +13,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 __all__ = ["PoolLimits", "WorkerPool"]
 
 T = TypeVar("T")
+Prepare: TypeAlias = Callable[[bool, bool, int], None]
 
 SLICE = 0.020
 """A small job that took longer, s, and is not finished goes on as a large one."""
@@ -40,7 +41,9 @@ class PoolLimits:
     queue_bytes: int
     """Bytes of large jobs that wait or run; those of small ones are few."""
     n_large: int = 1
-    """Large jobs that run together, ≥ 1."""
+    """Large jobs that run together while small ones are about, ≥ 1."""
+    n_large_alone: int = 1
+    """Likewise while none is; not fewer than those."""
 
 
 @dataclass(eq=False)
@@ -68,15 +71,15 @@ class WorkerPool(Generic[T]):
         may raise. One job is advanced by one thread at a time, not always the same.
     limits : PoolLimits
     prepare : callable, optional
-        Called in the worker before each step with whether it is of a large job, and
-        whether no small job is about.
+        Called in the worker before each step with whether it is of a large job, whether
+        no small job is about, and how many large jobs run together.
     """
 
     def __init__(
         self,
         begin: Callable[[T], Iterator[None]],
         limits: PoolLimits,
-        prepare: Callable[[bool, bool], None] = lambda is_large, is_alone: None,
+        prepare: Prepare = lambda is_large, is_alone, n_large: None,
     ) -> None:
         self._begin = begin
         self._limits = limits
@@ -199,7 +202,8 @@ class WorkerPool(Generic[T]):
 
     def _work(self, is_kept: bool) -> None:
         while (task := self._take(is_kept)) is not None:
-            self._prepare(task.is_large, self._is_alone())
+            is_alone = self._is_alone()
+            self._prepare(task.is_large, is_alone, self._n_together(is_alone))
             began = time.monotonic()
             is_done = self._advance(task)
             task.spent += time.monotonic() - began
@@ -251,8 +255,18 @@ class WorkerPool(Generic[T]):
     def _has_large(self) -> bool:
         """Return whether a large job can be advanced now."""
         can_begin = self._large and self._n_begun < LARGE_BEGUN
-        is_free = self._large_running < self._limits.n_large
+        is_free = self._large_running < self._most_large(self._is_alone())
         return is_free and bool(can_begin or self._begun)
+
+    def _most_large(self, is_alone: bool) -> int:
+        limits = self._limits
+        return max(limits.n_large, limits.n_large_alone if is_alone else 1)
+
+    def _n_together(self, is_alone: bool) -> int:
+        """Return how many large jobs run now, or will as soon as they are taken."""
+        can_begin = min(len(self._large), LARGE_BEGUN - self._n_begun)
+        n = self._large_running + len(self._begun) + max(can_begin, 0)
+        return max(1, min(n, self._most_large(is_alone)))
 
     def _put_back(self, task: _Task[T], is_done: bool) -> None:
         with self._for_others:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import copy
-import math
-import time
+import uuid
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from configspace.errors import CacheError, InvalidInput, Problem
+from configspace.errors import CacheError
 from configspace.space import PermissibleSpace
 from configspace.storage import parse_space
 from configspace.vehicle import Vehicle
@@ -23,18 +20,14 @@ from omniplan.batch.many import SCHEMA, require_names
 from omniplan.choosing.requirements import Requirement
 from omniplan.report import Ranking, Report
 from omniplan.trajectory import Trajectory, timed
-from services.asking.asker import Asker
 from services.asking.batch_client import Part, Progress, asked, questions_of, slices_of
-from services.asking.sheet_cache import SheetCache
-from services.errors import ServiceError, ServiceUnreachable
-from services.guarding.security import Security, check_endpoint, zenoh_entries
+from services.asking.connection import Connection, checked_timeout
+from services.errors import ServiceError
 from services.protocol.arrow_motions import table_of_twists
 from services.protocol.batch_messages import BatchTwistsRequest, BatchValidateRequest
-from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
-from services.protocol.keys import Keys, Route
+from services.protocol.keys import Route
 from services.protocol.messages import (
     Health,
-    Question,
     SelectReply,
     SelectRequest,
     ValidateReply,
@@ -55,7 +48,7 @@ __all__ = ["Client"]
 T = TypeVar("T")
 
 
-class Client:
+class Client(Connection):
     """Asks a server; use it in a ``with`` block. It may be shared by threads.
 
     The connection is made by the first question and made again by itself after a loss.
@@ -89,30 +82,6 @@ class Client:
         If a value is not allowed: InvalidEndpoint for the address, InvalidSecurity for
         a certificate.
     """
-
-    def __init__(
-        self,
-        endpoint: str | Sequence[str] = DEFAULT_ENDPOINT,
-        *,
-        site: str = "default",
-        timeout: float = 10.0,
-        attempt_timeout: float | None = None,
-        retry: bool = True,
-        security: Security | None = None,
-    ) -> None:
-        keys = Keys(site)
-        self._timeout = _checked_timeout("timeout", timeout)
-        if attempt_timeout is not None:
-            _checked_timeout("attempt_timeout", attempt_timeout)
-        self._asker = Asker(
-            _endpoints(endpoint, security),
-            keys,
-            zenoh_entries(security, "client", keys),
-            min(timeout, attempt_timeout or timeout),
-            retry=retry,
-        )
-        self._sheets = SheetCache(self._asker)
-        self._stop: Stop | None = None
 
     def validate(
         self,
@@ -328,7 +297,9 @@ class Client:
             That which is there now; the same as before if the vehicle is.
         """
         text = vehicle.model_dump_json(exclude_none=True)
-        request = RegisterRequest(vehicle=text, expected_version=expected_version)
+        request = RegisterRequest(
+            vehicle=text, expected_version=expected_version, request=uuid.uuid4().hex
+        )
         payload = self._ask(Route("register", vehicle.name), encode(request))
         return _read(lambda: decode(RegisterReply, payload).version)
 
@@ -347,7 +318,9 @@ class Client:
         version : str
             That of the removal.
         """
-        request = UnregisterRequest(expected_version=expected_version)
+        request = UnregisterRequest(
+            expected_version=expected_version, request=uuid.uuid4().hex
+        )
         payload = self._ask(Route("unregister", name), encode(request))
         return _read(lambda: decode(RegisterReply, payload).version)
 
@@ -369,69 +342,6 @@ class Client:
         finally:
             withdraw()
 
-    def wait_until_ready(self, timeout: float | None = None) -> None:
-        """Wait until a server of the site can be asked, also one that starts later.
-
-        Parameters
-        ----------
-        timeout : float, s, > 0, optional
-            Default the timeout of the client.
-
-        Raises
-        ------
-        ServiceUnreachable
-            If there is none in time.
-        """
-        if timeout is None:
-            timeout = self._timeout
-        deadline = time.monotonic() + _checked_timeout("timeout", timeout)
-        peer = self._asker.peer(timeout, patience=timeout)
-        left = max(0.0, deadline - time.monotonic())
-        keys = self._asker.keys
-        if not peer.wait_for_token(keys.servers, left):
-            reason = f"no server of site {keys.site!r} within {timeout:g} s"
-            raise ServiceUnreachable(self._asker.where, reason)
-
-    def close(self) -> None:
-        """End the connection; more questions are errors."""
-        self._asker.close()
-
-    def stoppable(self, stop: Stop) -> Self:
-        """Return this client, with the same connection, for questions that `stop` ends.
-
-        Parameters
-        ----------
-        stop : Stop
-            May be set by any thread; then the server is told, too.
-        """
-        view = copy.copy(self)
-        view._stop = stop
-        return view
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def _ask(self, route: Route, payload: bytes | None = None) -> bytes:
-        """Return the payload of the answer to one question."""
-        return self._asker.ask(route, payload, self._timeout, self._stop)
-
-    def _ask_question(self, route: Route, question: Question) -> bytes:
-        """Likewise for one that can be cancelled and has a deadline."""
-
-        def payload(name: str, timeout: float) -> bytes:
-            own = {"request": name, "deadline": timeout}
-            return encode(question.model_copy(update=own))
-
-        return self._asker.ask(route, payload, self._timeout, self._stop)
-
     def _verdicts(
         self,
         trajectories: Sequence[Trajectory],
@@ -452,23 +362,6 @@ class Client:
             _checked_overall(timeout),
             self._stop or Stop(),
         )
-
-
-def _endpoints(
-    endpoint: str | Sequence[str], security: Security | None
-) -> list[Endpoint]:
-    """Return the addresses, or raise for the first that is none."""
-    if isinstance(endpoint, str):
-        places = {"endpoint": endpoint}
-    else:
-        places = {f"endpoint[{i}]": text for i, text in enumerate(endpoint)}
-    if not places:
-        raise InvalidInput(Problem("endpoint", "an empty list", "at least one address"))
-    found = []
-    for where, text in places.items():
-        found.append(Endpoint.parse(where, text))
-        check_endpoint(where, found[-1], security)
-    return found
 
 
 def _told(parts: Iterator[Part], progress: Progress | None) -> Iterator[Part]:
@@ -499,10 +392,4 @@ def _one_each(
 
 
 def _checked_overall(timeout: float | None) -> float | None:
-    return None if timeout is None else _checked_timeout("timeout", timeout)
-
-
-def _checked_timeout(where: str, timeout: float) -> float:
-    if not (math.isfinite(timeout) and timeout > 0):
-        raise InvalidInput(Problem(where, f"{timeout} s", "positive and finite"))
-    return timeout
+    return None if timeout is None else checked_timeout("timeout", timeout)

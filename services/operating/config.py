@@ -28,6 +28,7 @@ from configspace.errors import InvalidInput, Problem
 from services.operating.logs import LogFormat, LogLevel
 from services.protocol.endpoint import DEFAULT_ENDPOINT, Endpoint
 from services.protocol.keys import checked_chunk
+from services.registering.registry import MAX_MEMORY
 
 __all__ = [
     "LimitsConfig",
@@ -144,6 +145,8 @@ class RegistrationConfig(_Table):
     """Folder that keeps them; needed where registration is enabled."""
     max_vehicles: Annotated[int, Field(ge=1)] = 1000
     """How many, at most."""
+    max_memory: Annotated[int, Field(ge=1)] = MAX_MEMORY
+    """What their data sheets may take together, bytes."""
 
     @model_validator(mode="after")
     def _has_store(self) -> RegistrationConfig:
@@ -171,7 +174,7 @@ class ServiceConfig(_Table):
     """Listen without security also where other machines reach it."""
     peers: Annotated[tuple[Address, ...], Field(strict=False)] = ()
     """Where the other servers of the site listen."""
-    workers: Annotated[int, Field(ge=1, le=64)] = 2
+    workers: Annotated[int, Field(ge=1, le=64)] = 3
     """Threads that answer; of two or more, one is kept for small requests."""
     stop_within: Annotated[float, Field(ge=0)] = 10.0
     """Time for requests to finish when the server is stopped, s."""

@@ -46,6 +46,7 @@ def registry_of(config: ServiceConfig, fleet: Sequence[PermissibleSpace]) -> Reg
         given.store,
         registration=given.enabled,
         max_vehicles=given.max_vehicles,
+        max_memory=given.max_memory,
     )
 
 

@@ -184,12 +184,16 @@ def _named(column: pa.ChunkedArray[Any]) -> tuple[list[str], IntArray]:
         if not types.is_dictionary(chunk.type):
             encoded = chunk.dictionary_encode()
         index = encoded.indices.to_numpy(zero_copy_only=False)
-        used, first, inverse = np.unique(index, return_index=True, return_inverse=True)
+        # Most rows have the name of the row before.
+        starts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1))
+        used, first, inverse = np.unique(
+            index[starts], return_index=True, return_inverse=True
+        )
         texts = encoded.dictionary.take(pa.array(used)).to_pylist()
         code = np.empty(used.size, dtype=np.int64)
         for k in np.argsort(first):
             code[k] = number.setdefault(texts[k], len(number))
-        codes.append(code[inverse])
+        codes.append(np.repeat(code[inverse], np.diff(starts, append=index.size)))
     if None in number:
         problem = Problem("column trajectory", "a name is null", "a text")
         raise InvalidMessage(problem)

@@ -22,6 +22,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 from configspace.errors import InvalidInput, Problem
@@ -182,6 +183,11 @@ class Keys:
         routes += [Route(verb, id) for id in vehicles for verb in _OF_VEHICLE]
         return tuple(map(self.of, routes))
 
+    @cached_property
+    def _plain(self) -> dict[str, Route]:
+        """What the keys without a name ask for."""
+        return {f"{self.root}/{path}": Route(verb) for path, verb in _PLAIN.items()}
+
     def route(self, key: str) -> Route:
         """Return what a concrete key asks for.
 
@@ -190,10 +196,10 @@ class Keys:
         InvalidMessage
             With code ``unknown_key`` if the site has no such key.
         """
-        relative = key.removeprefix(f"{self.root}/")
-        if relative in _PLAIN:
-            return Route(_PLAIN[relative])
-        match relative.split("/"):
+        plain = self._plain.get(key)
+        if plain is not None:
+            return plain
+        match key.removeprefix(f"{self.root}/").split("/"):
             case [kind, id] if kind in _WITH_ID and _CHUNK.fullmatch(id):
                 return Route(_WITH_ID[kind], id)
         known = [*_PLAIN, *(f"{kind}/{{id}}" for kind in _WITH_ID)]

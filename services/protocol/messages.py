@@ -265,6 +265,8 @@ class Health(Message):
     """Time since the start, s."""
     memory: Count | None = None
     """What the process holds in memory, bytes; null where that is not known."""
+    sheet_bytes: Count
+    """What the data sheets of the vehicles take of it."""
     keys: dict[str, KeyHealth] = {}
     """What was answered, by kind of key: ``validate``, ``space``, ...; ``unknown``."""
 

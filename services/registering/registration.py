@@ -39,10 +39,12 @@ def change(registry: Registry, route: Route, payload: bytes) -> bytes:
     """
     if route.verb == "register":
         asked = decode(RegisterRequest, payload)
-        done = registry.put(route.id, asked.content(), asked.expected_version)
+        done = registry.put(
+            route.id, asked.content(), asked.expected_version, asked.request
+        )
     else:
-        expected = decode(UnregisterRequest, payload or b"{}").expected_version
-        done = registry.delete(route.id, expected)
+        removed = decode(UnregisterRequest, payload or b"{}")
+        done = registry.delete(route.id, removed.expected_version, removed.request)
     return encode(RegisterReply.of(done))
 
 

@@ -10,15 +10,12 @@ one of the same name is kept in the store, but not used.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType, TracebackType
-from typing import Literal, Self, TypeAlias
+from typing import Self, TypeAlias
 
 from configspace.build import build_space
 from configspace.errors import InvalidInput, InvalidVehicle, Problem
@@ -28,54 +25,23 @@ from configspace.vehicle import Vehicle
 from configspace.vehicle_io import parse_vehicle
 from services.errors import CODES, InvalidMessage, RegistrationRefused, StoreError
 from services.protocol.keys import checked_chunk
+from services.registering.snapshot import Change, Snapshot, sheet_bytes
 from services.registering.store import Record, VehicleStore
 from services.registering.versions import Clock, Version
 
-__all__ = ["ABSENT", "Change", "Registry", "Snapshot"]
+__all__ = ["ABSENT", "MAX_MEMORY", "Registry"]
 
 ABSENT = "absent"
 """Expected version of a vehicle that must not be there yet."""
+MAX_MEMORY = 2**30
+"""What the data sheets of registered vehicles may take by default, bytes."""
 MAX_VEHICLE_BYTES = 512 * 1024
 """Longest vehicle file; one with the most wheels that are allowed fits well."""
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Change:
-    """A vehicle was registered or removed."""
-
-    id: str
-    version: Version
-    kind: Literal["put", "delete"]
-    fingerprint: str
-    """Content hash of the data sheet; empty where there is none."""
-
-
 Listener: TypeAlias = Callable[[Change], None]
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """All that a registry knows at one moment; read-only."""
-
-    fleet: Mapping[str, PermissibleSpace]
-    """The vehicles by name: first those of the start, then registered ones, sorted."""
-    records: Mapping[str, Record]
-    """The newest record of every vehicle that was ever registered."""
-    problems: Mapping[str, str] = field(default_factory=dict)
-    """Why a registered vehicle is not used, by name."""
-
-    def fingerprint(self, name: str) -> str:
-        """Return the content hash of a vehicle's data sheet, empty if there is none."""
-        space = self.fleet.get(name)
-        return "" if space is None else space.header.fingerprint
-
-    @cached_property
-    def state(self) -> str:
-        """A hash that is equal where all versions are."""
-        lines = (f"{r.id} {r.version}\n" for _, r in sorted(self.records.items()))
-        return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 class Registry:
@@ -91,6 +57,8 @@ class Registry:
         Whether vehicles may be registered and removed; needs a store.
     max_vehicles : int, ≥ 1
         Names that may ever be registered, removed ones included.
+    max_memory : int, bytes, ≥ 1
+        What the data sheets of registered vehicles may take together.
     grid : Grid, optional
         Of the data sheets; default as for `build_space`.
 
@@ -107,6 +75,7 @@ class Registry:
         store: VehicleStore | None = None,
         registration: bool = False,
         max_vehicles: int = 1000,
+        max_memory: int = MAX_MEMORY,
         grid: Grid | None = None,
     ) -> None:
         if registration and store is None:
@@ -114,16 +83,20 @@ class Registry:
             raise InvalidInput(Problem("registration", "on", allowed))
         if max_vehicles < 1:
             raise InvalidInput(Problem("max_vehicles", f"{max_vehicles}", "at least 1"))
+        if max_memory < 1:
+            raise InvalidInput(Problem("max_memory", f"{max_memory}", "at least 1"))
         self._fixed = _by_name(fleet)
         self._store = store
         self._is_open = registration
         self._max_vehicles = max_vehicles
+        self._max_memory = max_memory
         self._grid = grid
         self._listeners: list[Listener] = []
         self._lock = threading.Lock()
         """Held from the last look at the present state to the end of a change."""
         self._clock = Clock("0" * 16 if store is None else store.instance)
         self._registered: dict[str, PermissibleSpace] = {}
+        self._sizes: dict[str, int] = {}  # bytes of their data sheets
         self._problems: dict[str, str] = {}
         self._snapshot = Snapshot(MappingProxyType(self._fixed), MappingProxyType({}))
         if store is not None:
@@ -137,6 +110,7 @@ class Registry:
         *,
         registration: bool = True,
         max_vehicles: int = 1000,
+        max_memory: int = MAX_MEMORY,
         grid: Grid | None = None,
     ) -> Registry:
         """Return a registry that keeps registered vehicles in a folder.
@@ -153,6 +127,7 @@ class Registry:
                 store=store,
                 registration=registration,
                 max_vehicles=max_vehicles,
+                max_memory=max_memory,
                 grid=grid,
             )
         except BaseException:
@@ -180,12 +155,18 @@ class Registry:
         return self._is_open
 
     def put(
-        self, name: str, vehicle: bytes, expected_version: str | None = None
+        self,
+        name: str,
+        vehicle: bytes,
+        expected_version: str | None = None,
+        request: str | None = None,
     ) -> Change:
         """Register a vehicle, or a new version of it; on return it is stored.
 
         What is registered already, to the same content, stays as it is, whatever is
-        expected: so it does no harm to ask again when an answer was lost.
+        expected: so it does no harm to ask again when an answer was lost. With the name
+        of the request this holds also where another change has followed: that one is
+        not undone.
 
         Parameters
         ----------
@@ -195,6 +176,8 @@ class Registry:
             A vehicle file, JSON or YAML.
         expected_version : str, optional
             The version that it replaces, or `ABSENT`.
+        request : str, optional
+            A name for this change, the same when it is asked again.
 
         Returns
         -------
@@ -204,8 +187,9 @@ class Registry:
         Raises
         ------
         RegistrationRefused
-            If registrations are off, the version is another one (``conflict``), the
-            vehicle is one of the start, there is no room, or it cannot be stored.
+            If registrations are off, the version is another one or the same request was
+            followed by another change (``conflict``), the vehicle is one of the start,
+            there is no room, or it cannot be stored.
         InvalidInput
             If name, version or vehicle is not allowed: InvalidVehicle for the latter.
         """
@@ -217,10 +201,19 @@ class Registry:
             if old is not None and old.vehicle == text and name in self._registered:
                 return self._change(old)
             self._check_version(name, old, expected_version)
+            self._check_followed(old, request)
             self._check_room(name)
-            return self._apply(Record(name, self._clock.next(), text), space)
+            problem = self._too_much(name, space)
+            if problem:
+                raise RegistrationRefused("registry_full", problem, "vehicle")
+            return self._apply(self._next(name, text, request), space)
 
-    def delete(self, name: str, expected_version: str | None = None) -> Change:
+    def delete(
+        self,
+        name: str,
+        expected_version: str | None = None,
+        request: str | None = None,
+    ) -> Change:
         """Remove a registered vehicle; one that is removed already stays so.
 
         Parameters
@@ -228,6 +221,8 @@ class Registry:
         name : str
         expected_version : str, optional
             The version that is to be removed.
+        request : str, optional
+            As for `put`.
 
         Returns
         -------
@@ -251,7 +246,8 @@ class Registry:
             if old.is_deleted:
                 return self._change(old)
             self._check_version(name, old, expected_version)
-            return self._apply(Record(name, self._clock.next(), None), None)
+            self._check_followed(old, request)
+            return self._apply(self._next(name, None, request), None)
 
     def merge(self, record: Record) -> bool:
         """Take over what another server has stored, if it is newer.
@@ -370,6 +366,31 @@ class Registry:
             message = f"expected_version: {expected}; {name} is {present}"
             raise RegistrationRefused("conflict", message, "expected_version")
 
+    def _check_followed(self, old: Record | None, request: str | None) -> None:
+        """Raise if a change was made by this request, and then another one."""
+        if old is not None and request in old.requests:
+            message = (
+                f"request: {request}; it was done, and another change followed: "
+                f"{old.id} is {ABSENT if old.is_deleted else old.version}"
+            )
+            raise RegistrationRefused("conflict", message, "request")
+
+    def _too_much(self, name: str, space: PermissibleSpace) -> str:
+        """Return why the data sheet of a vehicle has no room; empty if it has."""
+        total = sum(self._sizes.values()) - self._sizes.get(name, 0)
+        total += sheet_bytes(space)
+        if total <= self._max_memory:
+            return ""
+        return (
+            f"vehicle: {name!r}; the data sheets would take {total} bytes, "
+            f"at most {self._max_memory} are allowed"
+        )
+
+    def _next(self, name: str, text: str | None, request: str | None) -> Record:
+        """Return the record of a change that is made here."""
+        requests = () if request is None else (request,)
+        return Record(name, self._clock.next(), text, requests)
+
     def _check_room(self, name: str) -> None:
         records = self._snapshot.records
         if name not in records and len(records) >= self._max_vehicles:
@@ -385,6 +406,7 @@ class Registry:
         """Store, swap, tell; the lock is held."""
         if self._store is None or not self._is_open:
             raise _refused("registration_off")
+        record = record.after(self._snapshot.records.get(record.id))
         try:
             self._store.write(record)
         except StoreError as error:
@@ -399,9 +421,15 @@ class Registry:
 
     def _enter(self, name: str, space: PermissibleSpace | None, problem: str) -> None:
         self._registered.pop(name, None)
+        self._sizes.pop(name, None)
         self._problems.pop(name, None)
+        if space is not None and (too_much := self._too_much(name, space)):
+            # Of another server, or stored while more was allowed.
+            _log.error("registered vehicle %s is not used: %s", name, too_much)
+            space, problem = None, too_much
         if space is not None:
             self._registered[name] = space
+            self._sizes[name] = sheet_bytes(space)
         if problem:
             self._problems[name] = problem
         elif space is not None and name in self._fixed:

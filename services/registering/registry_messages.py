@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field
 
 from configspace.errors import InvalidInput
-from services.protocol.messages import Message
-from services.registering.registry import Change, Snapshot
-from services.registering.store import Record
+from services.protocol.messages import CHUNK, Message
+from services.registering.snapshot import Change, Snapshot
+from services.registering.store import MAX_REQUESTS, Record
 from services.registering.versions import Version
 
 __all__ = [
@@ -32,6 +32,8 @@ MAX_RECORDS_BYTES = 4 * 2**20
 
 Kind: TypeAlias = Literal["put", "delete"]
 Names: TypeAlias = Annotated[tuple[str, ...], Field(strict=False)]
+RequestName: TypeAlias = Annotated[str, Field(pattern=CHUNK)]
+RequestNames: TypeAlias = Annotated[tuple[RequestName, ...], Field(strict=False)]
 
 
 class RegisterRequest(Message):
@@ -41,6 +43,8 @@ class RegisterRequest(Message):
     """A vehicle file: as a JSON object, or the text of a JSON or YAML file."""
     expected_version: str | None = None
     """The version that it replaces, or ``absent``; None for whatever is there."""
+    request: RequestName | None = None
+    """Name of this change, the same when it is asked again; one that nobody guesses."""
 
     def content(self) -> bytes:
         """Return the vehicle file."""
@@ -56,6 +60,8 @@ class UnregisterRequest(Message):
 
     expected_version: str | None = None
     """The version that is to be removed; None for whatever is there."""
+    request: RequestName | None = None
+    """As in a RegisterRequest."""
 
 
 class RegisterReply(Message):
@@ -100,10 +106,13 @@ class RecordEntry(Message):
     version: str
     vehicle: str | None = None
     """The vehicle file as JSON; None: it was removed."""
+    requests: Annotated[RequestNames, Field(max_length=MAX_REQUESTS)] = ()
+    """Names of the requests that made its newest changes."""
 
     def value(self) -> Record:
         """Return the record; InvalidInput if it is none."""
-        return Record(self.id, Version.parse(self.version), self.vehicle)
+        version = Version.parse(self.version)
+        return Record(self.id, version, self.vehicle, self.requests)
 
 
 class Digest(Message):
@@ -160,6 +169,11 @@ class Records(Message):
             if entries and size > MAX_RECORDS_BYTES:
                 break
             version = str(record.version)
-            entry = RecordEntry(id=name, version=version, vehicle=record.vehicle)
+            entry = RecordEntry(
+                id=name,
+                version=version,
+                vehicle=record.vehicle,
+                requests=record.requests,
+            )
             entries.append(entry)
         return cls(records=tuple(entries))

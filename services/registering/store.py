@@ -20,7 +20,7 @@ import logging
 import os
 import secrets
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Any, Self
@@ -29,7 +29,10 @@ from services.errors import StoreError
 from services.protocol.keys import checked_chunk
 from services.registering.versions import MAX_COUNTER, Version, is_instance
 
-__all__ = ["Record", "VehicleStore"]
+__all__ = ["MAX_REQUESTS", "Record", "VehicleStore"]
+
+MAX_REQUESTS = 16
+"""Requests that are remembered for each vehicle."""
 
 _FORMAT = "omniplan vehicle store 1"
 _TEMPORARY = ".tmp-"
@@ -51,9 +54,23 @@ class Record:
     version: Version
     vehicle: str | None
     """The vehicle file as JSON; None: deleted."""
+    requests: tuple[str, ...] = ()
+    """Names of the requests that made the newest changes; see `after`."""
 
     def __post_init__(self) -> None:
         checked_chunk("vehicle", self.id)
+        for name in self.requests:
+            checked_chunk("request", name)
+
+    def after(self, old: Record | None) -> Record:
+        """Return this record, knowing also the requests behind the one before.
+
+        So one that is asked again because its answer was lost is recognised, also where
+        another change has followed, after a restart, or by another server.
+        """
+        before = () if old is None else old.requests
+        known = dict.fromkeys((*before, *self.requests))
+        return replace(self, requests=tuple(known)[-MAX_REQUESTS:])
 
     @property
     def is_deleted(self) -> bool:
@@ -186,6 +203,7 @@ def _dumped(record: Record) -> bytes:
         "counter": record.version.counter,
         "instance": record.version.instance,
         "vehicle": record.vehicle,
+        "requests": record.requests,
     }
     return json.dumps({"checksum": _checksum(content), **content}).encode()
 
@@ -203,8 +221,13 @@ def _parsed(data: bytes) -> Record:
             "counter": int(counter),
             "instance": str(instance),
             "vehicle": None | str() as vehicle,
-        } if 0 < counter <= MAX_COUNTER and is_instance(instance):
-            return Record(id, Version(counter, instance), vehicle)
+            "requests": [*requests],
+        } if (
+            0 < counter <= MAX_COUNTER
+            and is_instance(instance)
+            and all(isinstance(name, str) for name in requests)
+        ):
+            return Record(id, Version(counter, instance), vehicle, tuple(requests))
     raise ValueError("its keys are not those of a record")
 
 

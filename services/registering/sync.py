@@ -20,7 +20,7 @@ from configspace.errors import InvalidInput
 from services.errors import InvalidMessage, RegistrationRefused, ServiceError
 from services.protocol.keys import Keys
 from services.protocol.messages import JSON, decode, encode
-from services.registering.registry import Change, Registry, Snapshot
+from services.registering.registry import Registry
 from services.registering.registry_messages import (
     MAX_WANTED,
     Digest,
@@ -29,6 +29,7 @@ from services.registering.registry_messages import (
     VehicleEvent,
     Wanted,
 )
+from services.registering.snapshot import Change, Snapshot
 from services.registering.versions import Version
 from services.wire.exchange import Publication, Request
 from services.wire.session import Peer

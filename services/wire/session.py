@@ -354,6 +354,8 @@ class Peer:
                 encoding=None if payload is None else encoding_of(encoding),
                 timeout=timeout,
                 target=zenoh.QueryTarget.ALL if everyone else None,
+                # Otherwise the first reply is held back until there are no more.
+                consolidation=zenoh.ConsolidationMode.NONE if first else None,
                 cancellation_token=None if stop is None else stop.token,
             )
             for reply in channel:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from omniplan import cli
+from omniplan.shell import asking, serving
 from omniplan.shell.answers import BAD_INPUT
 from services.operating.config import ServiceConfig, load_config, variables
 
@@ -49,7 +50,7 @@ def test_the_units_command_line_is_taken(unit: dict[str, list[str]]) -> None:
     assert program.endswith("/bin/omniplan")
     options = cli._parser().parse_args(arguments)
     assert options.config == "/etc/omniplan/server.toml"
-    assert options.run is cli._serve
+    assert options.run is serving.serve
 
 
 def test_the_kill_comes_after_the_time_to_stop(unit: dict[str, list[str]]) -> None:
@@ -96,9 +97,9 @@ def test_the_container_runs_as_nobody_in_particular() -> None:
     assert users[-1] == "10001"
     (entry,) = re.findall(r"^ENTRYPOINT (.*)$", CONTAINER, re.M)
     command = json.loads(entry)
-    assert cli._parser().parse_args(command[1:]).run is cli._serve
+    assert cli._parser().parse_args(command[1:]).run is serving.serve
     (health,) = re.findall(r"^    CMD (\[.*\])$", CONTAINER, re.M)
-    assert cli._parser().parse_args(json.loads(health)[1:]).run is cli._query
+    assert cli._parser().parse_args(json.loads(health)[1:]).run is asking.query
 
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="no systemd here")

@@ -11,7 +11,7 @@ import configspace
 from configspace import Grid, vehicle_from_data
 from configspace.testing import random_vehicle
 from omniplan import Tolerances, Trajectory, validate
-from omniplan.judging.swing import Swing
+from omniplan.judging.swing import Pieces, Swing
 from omniplan.judging.vehicle_judge import VehicleJudge
 from omniplan.motion import Intervals, OmniCurveMotion, PoseMotion, motion_of
 
@@ -107,15 +107,15 @@ def test_a_stop_to_stop_interval_is_factored_at_both_ends() -> None:
 
 def test_an_instant_at_which_a_wheel_stands_has_no_bound() -> None:
     # The vehicle starts to move ahead while it turns about its origin.
-    instant = Swing(
-        dt=np.zeros(1),
-        h=np.zeros((2, 1)),
+    pieces = Pieces(
         speed=np.array([[0.0], [1.0], [0.0], [0.0]], dtype=np.complex128),
         turn=np.array([[0.0], [0.0], [1.0], [0.0]]),
         since=np.array([np.inf]),
         heading=np.array([[0.0], [0.0], [1.0], [0.0]]),
         point=0j,
-    ).directions
+    )
+    knot = np.zeros(1, dtype=np.int64)
+    instant = Swing(np.zeros(1), np.zeros((2, 1)), knot, lambda: pieces).directions
     for values in (instant.accelerations, instant.rates):
         ends, bound = values(0j)
         assert (ends == 0).all()

@@ -280,3 +280,10 @@ def test_omni_curve_data_needs_a_whole_vehicle(vehicle_data: Any) -> None:
     data = {"t": [0, 1], "omni_curve": [[0, 0, 0], [0, 0, 0]], "vehicle": vehicle_data}
     with pytest.raises(InvalidVehicle):
         Trajectory.from_dict(data)
+
+
+@pytest.mark.parametrize("t", [[0, 1, 2], None])
+def test_headings_in_degrees_are_refused(t: list[float] | None) -> None:
+    poses = [[0, 0, 0], [1, 0, 45], [2, 0, 90]]
+    with pytest.raises(InvalidTrajectory, match="row 1, theta: 45 after 0; radians"):
+        Trajectory.from_poses(t, poses)

@@ -149,3 +149,36 @@ def test_swapped_arguments_are_said(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"trajectories\[1\]: int"):
         write_trajectories(file, [line, 3])  # type: ignore[list-item]
     assert not file.exists()
+
+
+@pytest.mark.parametrize(
+    ("header", "hint"),
+    [
+        ("trajectory;t;x;y;theta", "columns are separated by commas"),
+        ("Trajectory,t,x,y,theta", r"did you mean trajectory\?"),
+        ("t,x,y,heading", "unknown column 'heading'; "),
+    ],
+)
+def test_an_unknown_column_comes_with_what_may_be_meant(
+    tmp_path: Path, header: str, hint: str
+) -> None:
+    with pytest.raises(InvalidInput, match=hint):
+        read(written(tmp_path, f"{header}\n0,0,0,0,0\n1,1,0,0,0\n"))
+
+
+def test_what_is_no_text_is_told_in_words(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="byte 0xfc at 8 is not UTF-8"):
+        read(written(tmp_path, b"t,x,y,th\xfc"))
+
+
+def test_a_file_that_cannot_be_written_is_bad_input_and_leaves_nothing(
+    tmp_path: Path,
+) -> None:
+    trajectory = Trajectory.from_poses([0, 1], [[0, 0, 0], [1, 0, 0]])
+    for name in ("a.csv", "a.parquet"):
+        with pytest.raises(InvalidInput, match="No such file or directory; must be"):
+            write_trajectories(tmp_path / "nowhere" / name, [trajectory])
+        (tmp_path / name).mkdir()
+        with pytest.raises(InvalidInput, match="Is a directory; must be writable"):
+            write_trajectories(tmp_path / name, [trajectory])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.parquet"]

@@ -51,6 +51,12 @@ def trajectories() -> list[Trajectory]:
     ]
 
 
+@pytest.fixture(autouse=True)
+def _small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the first part be one trajectory for two vehicles."""
+    monkeypatch.setattr(batches, "FIRST", 10)
+
+
 def chooser(fleet: Sequence[PermissibleSpace]) -> batches.Choose:
     by_name = {space.name: space for space in fleet}
     return lambda names: [by_name[name] for name in names or by_name]

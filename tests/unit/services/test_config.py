@@ -51,6 +51,7 @@ planners = ["planner-1", "planner-2"]
 enabled = true
 store = "store"
 max_vehicles = 7
+max_memory = 70000000
 """
 
 
@@ -109,6 +110,7 @@ def test_everything_can_be_said_in_a_file(file: Path) -> None:
     assert config.security is not None
     assert config.security.planners == ("planner-1", "planner-2")
     assert config.registration.max_vehicles == 7
+    assert config.registration.max_memory == 70_000_000
 
 
 def test_paths_in_a_file_are_relative_to_its_folder(file: Path) -> None:

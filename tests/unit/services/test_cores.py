@@ -20,12 +20,14 @@ def four_cores(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("workers", "expected"), [(1, 1), (2, 1), (3, 2), (4, 3), (64, 3)]
+    ("workers", "beside_small", "alone"),
+    [(1, 1, 1), (2, 1, 1), (3, 2, 2), (4, 3, 3), (5, 3, 4), (64, 3, 4)],
 )
 def test_a_worker_and_a_core_stay_for_small_requests(
-    four_cores: list[int], workers: int, expected: int
+    four_cores: list[int], workers: int, beside_small: int, alone: int
 ) -> None:
-    assert large_at_once(workers) == expected
+    assert large_at_once(workers, is_alone=False) == beside_small
+    assert large_at_once(workers, is_alone=True) == alone
 
 
 @pytest.mark.parametrize(

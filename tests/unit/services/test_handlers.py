@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 import configspace
@@ -13,7 +15,7 @@ from services.answering.answers import Answer
 from services.answering.calls import Call, Calls
 from services.answering.handlers import SHEET, Handlers, error_reply
 from services.errors import CallStopped, InvalidMessage
-from services.protocol.keys import Route
+from services.protocol.keys import Route, Verb
 from services.protocol.messages import Health, RequestLimits
 from services.registering.registry import Registry
 
@@ -37,6 +39,7 @@ def handlers(space: configspace.PermissibleSpace) -> Handlers:
         requests=0,
         errors=0,
         uptime=0.5,
+        sheet_bytes=0,
     )
     return Handlers(Registry([space]), lambda: health, RequestLimits(10_000))
 
@@ -162,3 +165,41 @@ def test_a_request_cancelled_before_it_is_read_is_not_worked_at(
     with pytest.raises(CallStopped) as caught:
         final(handlers, Route("validate"), message, "", Call(calls, "validate"))
     assert caught.value.code == "cancelled"
+
+
+@pytest.mark.parametrize("verb", ["validate", "select"])
+def test_a_request_is_stopped_within_one_trajectory(
+    handlers: Handlers, verb: Verb, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.cumsum(np.random.default_rng(5).uniform(0.0, 0.2, 200))
+    trajectory = Trajectory.from_poses(
+        np.arange(200.0), np.stack([x, np.zeros(200), np.zeros(200)], axis=-1)
+    )
+    message: dict[str, object] = {"trajectories": [trajectory.to_dict()]}
+    message |= {"vehicle": "differential"} if verb == "validate" else {}
+    payload = json.dumps(message).encode()
+
+    def checks(limit: float) -> int:
+        """Return how often a call is looked at; stop it the last time."""
+        call = Call.local()
+        check, n = call.check, 0
+
+        def counted() -> None:
+            nonlocal n
+            n += 1
+            if n >= limit:
+                call.stop("cancelled")
+            check()
+
+        monkeypatch.setattr(call, "check", counted)
+        found = handlers.answer(Route(verb), payload, "", call)
+        assert not isinstance(found, Answer)
+        with pytest.raises(CallStopped if limit < math.inf else StopIteration):
+            next(found)
+        return n
+
+    n = checks(math.inf)
+    assert n >= 3
+    # It ends where it is stopped: no more is done.
+    for limit in (2, n):
+        assert checks(limit) == limit

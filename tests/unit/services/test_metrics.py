@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 from pathlib import Path
 
@@ -75,13 +76,34 @@ def test_answers_are_counted_by_key_and_code_by_many_threads() -> None:
     assert figures["validate"].p50 == figures["validate"].p99 == 0.01
 
 
+def test_figures_are_those_of_all_answers_also_when_asked_in_between() -> None:
+    metrics = Metrics()
+    metrics.count("health", "ok", 0.001)
+    first = metrics.figures()
+    assert metrics.figures() == first
+    metrics.count("validate", "ok", 0.02)
+    metrics.count("validate", "busy", 0.04)
+    found = metrics.figures()
+    assert found["health"] == first["health"]
+    assert found["validate"].codes == {"ok": 1, "busy": 1}
+    assert found["validate"].p99 == 0.04
+    metrics.count("validate", "ok", 0.08)
+    assert metrics.figures()["validate"].codes == {"ok": 2, "busy": 1}
+    assert found["validate"].codes == {"ok": 1, "busy": 1}
+
+
 def test_memory_is_read_where_the_system_tells_it(tmp_path: Path) -> None:
     assert resident_bytes(tmp_path / "none") is None
-    damaged = tmp_path / "statm"
-    damaged.write_text("12 x")
-    assert resident_bytes(damaged) is None
-    damaged.write_text("")
-    assert resident_bytes(damaged) is None
+    told = tmp_path / "statm"
+    page = os.sysconf("SC_PAGE_SIZE")
+    for text, expected in (
+        ("12 x", None),
+        ("", None),
+        ("900 30 20", 30 * page),
+        ("900 31 20", 31 * page),
+    ):
+        told.write_text(text)
+        assert resident_bytes(told) == expected
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no Linux")

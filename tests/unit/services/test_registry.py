@@ -17,9 +17,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 import configspace
 from configspace import Grid, InvalidInput, InvalidVehicle
 from services.errors import InvalidMessage, RegistrationRefused
-from services.registering.registry import ABSENT, MAX_VEHICLE_BYTES, Change, Registry
+from services.registering.registry import ABSENT, MAX_VEHICLE_BYTES, Registry
 from services.registering.registry_messages import Digest, RecordEntry, Records
-from services.registering.store import Record
+from services.registering.snapshot import Change, sheet_bytes
+from services.registering.store import MAX_REQUESTS, Record
 from services.registering.versions import Version
 
 GRID = Grid(8, 16)
@@ -306,6 +307,83 @@ def test_there_is_room_for_so_many_names_and_no_more(tmp_path: Path) -> None:
         other = Record("c", Version(5, "b" * 16), None)
         assert refusal(registry, other, verb="merge").code == "registry_full"
         registry.put("b", vehicle_file("b", 2.0))
+
+
+def test_data_sheets_take_so_much_memory_and_no_more(tmp_path: Path) -> None:
+    most = 2 * sheet_bytes(space("a"))
+    with contextlib.closing(opened(tmp_path, max_memory=most)) as registry:
+        registry.put("a", vehicle_file("a"))
+        registry.put("b", vehicle_file("b"))
+        assert registry.snapshot.n_bytes == most
+        error = refusal(registry, "c", vehicle_file("c"))
+        assert error.code == "registry_full"
+        assert str(most) in str(error)
+        # A new version takes the place of the old one.
+        registry.put("b", vehicle_file("b", 2.0))
+        # What another server has is kept, but not used.
+        other = Record("c", Version(5, "b" * 16), vehicle_file("c").decode())
+        assert registry.merge(other)
+        assert set(registry.fleet) == {"a", "b"}
+        assert "bytes" in registry.snapshot.problems["c"]
+        registry.delete("b")
+        registry.put("c", vehicle_file("c", 2.0))
+        assert set(registry.fleet) == {"a", "c"}
+        assert registry.snapshot.n_bytes == most
+    with contextlib.closing(opened(tmp_path, max_memory=most // 2)) as registry:
+        assert set(registry.fleet) == {"a"}
+        assert "bytes" in registry.snapshot.problems["c"]
+    with pytest.raises(InvalidInput, match="max_memory: 0"):
+        Registry(max_memory=0)
+
+
+def test_what_is_asked_again_does_not_undo_what_followed(tmp_path: Path) -> None:
+    with contextlib.closing(opened(tmp_path / "one")) as registry:
+        first = registry.put("agv", vehicle_file(), request="mine")
+        assert registry.put("agv", vehicle_file(), request="mine") == first
+        theirs = registry.put("agv", vehicle_file("agv", 2.0), request="theirs")
+        error = refusal(registry, "agv", vehicle_file(), None, "mine")
+        assert (error.code, error.field) == ("conflict", "request")
+        assert str(theirs.version) in str(error)
+        # A removal likewise, and it does not undo a registration that followed.
+        removed = registry.delete("agv", request="away")
+        assert registry.delete("agv", request="away") == removed
+        assert refusal(registry, "agv", vehicle_file(), None, "mine").code == "conflict"
+        back = registry.put("agv", vehicle_file("agv", 0.5), request="back")
+        error = refusal(registry, "agv", None, "away", verb="delete")
+        assert error.code == "conflict"
+        records = Records.of(registry.snapshot, ["agv"]).records
+    # After a restart, and at another server, as well.
+    with contextlib.closing(opened(tmp_path / "one")) as registry:
+        assert refusal(registry, "agv", vehicle_file(), None, "mine").code == "conflict"
+        assert registry.put("agv", vehicle_file("agv", 0.5), request="back") == back
+    with contextlib.closing(opened(tmp_path / "two")) as registry:
+        assert registry.merge(records[0].value())
+        assert refusal(registry, "agv", vehicle_file(), None, "mine").code == "conflict"
+        # A change of one's own is another request.
+        registry.put("agv", vehicle_file(), request="mine-again")
+
+
+def test_requests_are_known_where_two_servers_changed_a_vehicle(tmp_path: Path) -> None:
+    with contextlib.closing(opened(tmp_path)) as registry:
+        registry.put("agv", vehicle_file(), request="mine")
+        (record,) = registry.snapshot.records.values()
+        newer = Version(record.version.counter + 1, "b" * 16)
+        content = vehicle_file("agv", 2.0).decode()
+        assert registry.merge(Record("agv", newer, content, ("theirs",)))
+        for name in ("mine", "theirs"):
+            error = refusal(registry, "agv", vehicle_file("agv", 0.5), None, name)
+            assert error.code == "conflict"
+
+
+def test_few_requests_are_remembered_and_their_names_are_checked(
+    registry: Registry,
+) -> None:
+    for i in range(MAX_REQUESTS + 3):
+        registry.put("agv", vehicle_file("agv", 1.0 + i), request=f"r{i}")
+    (record,) = registry.snapshot.records.values()
+    assert record.requests == tuple(f"r{i + 3}" for i in range(MAX_REQUESTS))
+    with pytest.raises(InvalidInput, match="request"):
+        registry.put("agv", vehicle_file(), request="a/b")
 
 
 def test_what_cannot_be_stored_is_not_registered(

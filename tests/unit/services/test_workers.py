@@ -176,6 +176,56 @@ def test_no_more_large_jobs_run_together_than_allowed() -> None:
     recorder.close()
 
 
+def test_more_large_jobs_run_together_while_no_small_one_is_about(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(workers, "QUIET", 1e9)
+    recorder = Recorder(n_workers=3, n_large=1, n_large_alone=2)
+    # Both are begun: no small job was ever there.
+    gates = [recorder.hold(is_large=True) for _ in range(2)]
+    recorder.small("a")
+    recorder.wait(1)
+    for name in "LM":
+        recorder.large(name)
+    gates[0].set()
+    assert recorder.wait(1) == ["a", "held"]
+    # From now on one at a time, and that one is still held.
+    assert len(recorder.pool) == 2
+    gates[1].set()
+    assert recorder.wait(3)[2:] == ["held", "L", "M"]
+    recorder.close()
+
+
+def test_what_is_prepared_knows_how_many_large_jobs_run_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls: list[tuple[bool, int]] = []
+    done = threading.Semaphore(0)
+    gate = threading.Event()
+
+    def begin(job: str) -> Iterator[None]:
+        if job == "held":
+            assert gate.wait(30)
+        done.release()
+        return iter(())
+
+    pool = WorkerPool(
+        begin,
+        PoolLimits(1, 8, 1000, n_large=1, n_large_alone=2),
+        lambda is_large, is_alone, n_large: calls.append((is_alone, n_large)),
+    )
+    pool.submit("held", is_large=True)
+    pool.submit("A", is_large=True)
+    pool.submit("B", is_large=True)
+    gate.set()
+    for _ in range(3):
+        assert done.acquire(timeout=30)
+    pool.stop()
+    assert pool.join(30)
+    assert calls[0][0]
+    assert [n for _, n in calls[1:]] == [2, 1]
+
+
 def test_a_small_job_that_takes_long_goes_on_as_a_large_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -317,7 +367,7 @@ def test_what_is_prepared_knows_whether_small_jobs_are_about(
     pool = WorkerPool(
         begin,
         PoolLimits(1, 8, 1000),
-        lambda is_large, is_alone: calls.append((is_large, is_alone)),
+        lambda is_large, is_alone, n_large: calls.append((is_large, is_alone)),
     )
     pool.submit("L", is_large=True)
     assert done.acquire(timeout=30)
