@@ -23,15 +23,13 @@ from typing import Any
 
 import numpy as np
 import zenoh  # noqa: TID251 - what the service is compared with
+from served import PER_TRAJECTORY, VEHICLE, served, wave
 
 import configspace
 import omniplan
 from services import Client
 from services.protocol.keys import Keys, Route
 from services.protocol.messages import Health, ValidateReply, ValidateRequest, encode
-
-VEHICLE = "mecanum"
-PER_TRAJECTORY = 10_000
 
 ECHO = """
 import json, sys, threading
@@ -47,13 +45,6 @@ session.declare_queryable("echo", answer)
 print("ready", flush=True)
 threading.Event().wait()
 """
-
-
-def wave(n: int, name: str) -> omniplan.Trajectory:
-    """Return a slow drive along a wave of n samples."""
-    t = np.linspace(0.0, 20.0, n)
-    poses = np.column_stack([0.2 * t, 0.05 * np.sin(t), 0.1 * np.sin(0.5 * t)])
-    return omniplan.Trajectory.from_poses(t, poses, name=name)
 
 
 def entries(**more: object) -> dict[str, object]:
@@ -93,25 +84,6 @@ def echo() -> Iterator[Callable[[bytes | None, int], None]]:
         yield ask
         session.close()  # type: ignore[no-untyped-call]
         process.kill()
-
-
-@contextlib.contextmanager
-def served() -> Iterator[str]:
-    """Yield the endpoint of a server in a process of its own."""
-    command = [sys.executable, "-m", "omniplan.cli", "serve", "--json"]
-    command += ["--fleet", VEHICLE, "--listen", "tcp/127.0.0.1:0"]
-    with subprocess.Popen(
-        [*command, "--log-level", "warning"], stdout=subprocess.PIPE, text=True
-    ) as server:
-        assert server.stdout is not None
-        text = ""
-        while not text.endswith("}\n"):
-            line = server.stdout.readline()
-            if not line:
-                raise SystemExit("the server has not started")
-            text += line
-        yield json.loads(text)["endpoint"]
-        server.terminate()
 
 
 def elapsed(call: Callable[[], object]) -> float:
@@ -219,7 +191,7 @@ def main() -> None:
     options = parser.parse_args()
     result: dict[str, Any] = {"load_before": os.getloadavg()[0]}
     with (
-        served() as endpoint,
+        served() as (endpoint, _),
         echo() as ask_echo,
         Client(endpoint, timeout=120.0) as client,
     ):

@@ -12,7 +12,6 @@ import argparse
 import json
 import multiprocessing
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -20,20 +19,11 @@ from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
+from served import PER_TRAJECTORY, VEHICLE, served, wave
 
-import omniplan
 from services import Client
 
 SMALL_EVERY = 0.01  # s
-VEHICLE = "mecanum"
-PER_TRAJECTORY = 10_000
-
-
-def wave(n: int, name: str) -> omniplan.Trajectory:
-    """Return a slow drive along a wave of n samples."""
-    t = np.linspace(0.0, 20.0, n)
-    poses = np.column_stack([0.2 * t, 0.05 * np.sin(t), 0.1 * np.sin(0.5 * t)])
-    return omniplan.Trajectory.from_poses(t, poses, name=name)
 
 
 def ask_small(endpoint: str, seconds: float, stop: Event | None) -> dict[str, Any]:
@@ -129,19 +119,7 @@ def main() -> None:
         "--kinds", nargs="+", default=["json", "trajectories", "twists"]
     )
     options = parser.parse_args()
-    command = [sys.executable, "-m", "omniplan.cli", "serve", "--json"]
-    command += ["--fleet", VEHICLE, "--listen", "tcp/127.0.0.1:0"]
-    with subprocess.Popen(
-        [*command, "--log-level", "warning"], stdout=subprocess.PIPE, text=True
-    ) as server:
-        assert server.stdout is not None
-        text = ""
-        while not text.endswith("}\n"):
-            line = server.stdout.readline()
-            if not line:
-                raise SystemExit("the server has not started")
-            text += line
-        endpoint = json.loads(text)["endpoint"]
+    with served() as (endpoint, server):
         results: dict[str, Any] = {
             "load": os.getloadavg()[0],
             "quiet": ask_small(endpoint, 5.0, None),

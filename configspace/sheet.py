@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from configspace.vehicle import Vehicle
 __all__ = [
     "ALGORITHM_VERSION",
     "FORMAT_VERSION",
+    "Sheet",
     "SheetHeader",
     "Tables",
     "fingerprint",
@@ -93,6 +94,20 @@ class SheetHeader:
             grid=grid,
             fingerprint=fingerprint(vehicle, grid),
         )
+
+
+class Sheet(Protocol):
+    """What can be asked how it hangs together: a `PermissibleSpace`, for one."""
+
+    @property
+    def header(self) -> SheetHeader:
+        """What the tables are of."""
+        ...
+
+    @property
+    def tables(self) -> Tables:
+        """The tables."""
+        ...
 
 
 def fingerprint(vehicle: Vehicle, grid: Grid) -> str:

@@ -14,7 +14,6 @@ same configuration, so a motion may go through that pole.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -25,10 +24,8 @@ from configspace.angles import wrap
 from configspace.errors import InvalidInput, Problem
 from configspace.kernels import BLOCKED, FREE, MIXED
 from configspace.omni_curve import finite, nominal_curvature
+from configspace.sheet import Sheet
 from configspace.turns import winding
-
-if TYPE_CHECKING:
-    from configspace.space import PermissibleSpace
 
 __all__ = [
     "REACHABLE",
@@ -120,12 +117,13 @@ def components(
     return _by_size(labels, open_)
 
 
-def part_states(space: PermissibleSpace) -> tuple[States, FloatArray, FloatArray]:
+def part_states(space: Sheet) -> tuple[States, FloatArray, FloatArray]:
     """Return the states of the 4 × 4 parts of all cells, and their edges.
 
     Parameters
     ----------
-    space : PermissibleSpace
+    space : Sheet
+        Such as a `PermissibleSpace`.
 
     Returns
     -------
@@ -136,6 +134,7 @@ def part_states(space: PermissibleSpace) -> tuple[States, FloatArray, FloatArray
     beta_edges : (4 m + 1,) float, rad
         Two times its β for a line-mobile vehicle.
     """
+    grid = space.header.grid
     bits = space.tables.parts[:, None, :, None]
     i, j = np.ogrid[:4, :4]
     free = (bits >> (4 * i + j)[:, None, :]) & 1 == 1
@@ -145,11 +144,11 @@ def part_states(space: PermissibleSpace) -> tuple[States, FloatArray, FloatArray
     state = state.reshape(4 * k, 4 * m)
     kappa, beta = (
         np.interp(np.arange(0, x.size - 0.75, 0.25), np.arange(x.size), x)
-        for x in (space.grid.kappa_edges, space.grid.beta_edges)
+        for x in (grid.kappa_edges, grid.beta_edges)
     )
-    if space.line_beta is not None:
-        state, beta = state[:, :1], np.full(2, space.line_beta)
-    if space.is_translating:
+    if space.header.line_beta is not None:
+        state, beta = state[:, :1], np.full(2, space.header.line_beta)
+    if space.header.is_translating:
         state, kappa = state[:1], np.zeros(2)
     return state, kappa, beta
 
@@ -202,16 +201,15 @@ def reachable(
     return code
 
 
-def summary(
-    space: PermissibleSpace, start: tuple[float, float] | None = (0.0, 0.0)
-) -> Summary:
+def summary(space: Sheet, start: tuple[float, float] | None = (0.0, 0.0)) -> Summary:
     """Return how many components a space has and how much can be reached.
 
     Judged by the parts of cells, see `part_states`.
 
     Parameters
     ----------
-    space : PermissibleSpace
+    space : Sheet
+        Such as a `PermissibleSpace`.
     start : (float, float), 1 and rad, optional
         As for `reachable`.
 

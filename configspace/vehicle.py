@@ -7,19 +7,13 @@ Numbers derived from them (K, κ_g, the axle of a line-mobile vehicle) are compu
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from configspace.support import support_edges
@@ -29,6 +23,25 @@ from configspace.undercarriage import (
     impossible_rates,
     mobility_of,
     skid_contacts,
+)
+from configspace.vehicle_parts import (
+    Curvature,
+    FileModel,
+    Guaranteed,
+    Limits,
+    Load,
+    Point,
+    SkidSteer,
+)
+from configspace.wheels import (
+    Castor,
+    FixedWheel,
+    MecanumWheel,
+    OmniWheel,
+    SteerableWheel,
+    SteeredWheel,
+    Turntable,
+    Wheel,
 )
 
 __all__ = [
@@ -47,251 +60,8 @@ __all__ = [
     "Wheel",
 ]
 
-# Generous bounds whose only purpose is to catch millimetres, km/h and radians.
-Metres: TypeAlias = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
-Height: TypeAlias = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-Speed: TypeAlias = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-Acceleration: TypeAlias = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-Degrees: TypeAlias = Annotated[float, Field(ge=-36000, le=36000, allow_inf_nan=False)]
-DegreeRate: TypeAlias = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
-RollerDegrees: TypeAlias = Annotated[float, Field(ge=-80, le=80, allow_inf_nan=False)]
-Curvature: TypeAlias = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 
-
-class _Model(BaseModel):
-    """Frozen, strict, no unknown keys."""
-
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False
-    )
-
-
-class _PlacedWheel(_Model):
-    id: str = Field(min_length=1, max_length=64, description="unique within a vehicle")
-    x: Metres = Field(description="contact point (steering axis), m, forward positive")
-    y: Metres = Field(description="m, left positive")
-
-    @property
-    def position(self) -> complex:
-        """Position in the file's frame as ``x + j y``, m."""
-        return complex(self.x, self.y)
-
-
-class _RollingWheel(_PlacedWheel):
-    max_speed: Speed | None = Field(
-        None, description="largest rolling speed, m/s; without it the wheel is passive"
-    )
-    max_acceleration: Acceleration | None = Field(
-        None, description="largest change of the rolling speed, m/s²"
-    )
-
-
-class SteerableWheel(_RollingWheel):
-    """What steered wheels and turntables share; α is measured from the x axis."""
-
-    steering_range_deg: tuple[Degrees, Degrees] | None = Field(
-        None, description="[least, largest] steering angle; without it it turns freely"
-    )
-    max_steering_rate_deg: DegreeRate | None = Field(None, description="degrees/s")
-    max_steering_acceleration_deg: DegreeRate | None = Field(
-        None, description="degrees/s²; judged for timed poses, else reports say so"
-    )
-    steering_coupling: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = Field(
-        0.0,
-        description="where rolling and steering share their motors: metres of rolling "
-        "that one radian of steering costs, |u| + coupling |α̇| ≤ max_speed",
-    )
-
-    @model_validator(mode="after")
-    def _range_is_ordered(self) -> Self:
-        if self.steering_range_deg is not None:
-            least, largest = self.steering_range_deg
-            if least >= largest:
-                raise PydanticCustomError(
-                    "steering_range",
-                    "steering_range_deg: the first angle must be less than the second",
-                )
-        return self
-
-    @property
-    def steering_range(self) -> tuple[float, float]:
-        """Least and largest steering angle, rad; infinite where it turns freely."""
-        if self.steering_range_deg is None:
-            return (-math.inf, math.inf)
-        least, largest = self.steering_range_deg
-        return (math.radians(least), math.radians(largest))
-
-    @property
-    def offsets(self) -> tuple[float, ...]:
-        """Signed lateral offset D of every wheel on the steering axis, m."""
-        raise NotImplementedError
-
-    @property
-    def standing_steering_rate(self) -> float:
-        """Largest |α̇| while the vehicle stands, rad/s; infinite if nothing bounds it.
-
-        Steering rolls a wheel beside its axis and takes its share of coupled motors:
-        ``|û| = |u - D (ω + α̇)|`` and ``|û| + coupling |α̇| ≤ max_speed`` leave
-        ``(|D| + coupling) |α̇| ≤ max_speed`` at u = ω = 0 (spec/omni-curve §2, §4).
-        """
-        rate = math.inf
-        if self.max_steering_rate_deg is not None:
-            rate = math.radians(self.max_steering_rate_deg)
-        taken = max(map(abs, self.offsets)) + self.steering_coupling
-        if self.max_speed is not None and taken > 0:
-            rate = min(rate, self.max_speed / taken)
-        return rate
-
-
-class SteeredWheel(SteerableWheel):
-    """A steered standard wheel, on its steering axis or beside it."""
-
-    type: Literal["steered"] = "steered"
-    offset: Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)] = Field(
-        0.0,
-        description="lateral axle offset D, m; positive where the wheel stands left of "
-        "the steering axis, seen along its rolling direction",
-    )
-
-    @property
-    def offsets(self) -> tuple[float, ...]:
-        """Signed lateral offset D, m."""
-        return (self.offset,)
-
-
-class Turntable(SteerableWheel):
-    """A turntable (Drehschemel) with two wheels on one axle, left and right of it."""
-
-    type: Literal["turntable"] = "turntable"
-    track: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = Field(
-        description="distance of the two wheels, m"
-    )
-
-    @property
-    def offsets(self) -> tuple[float, ...]:
-        """Signed lateral offsets of the two wheels, m."""
-        return (self.track / 2, -self.track / 2)
-
-
-class FixedWheel(_RollingWheel):
-    """A fixed standard wheel; it makes the vehicle line-mobile."""
-
-    type: Literal["fixed"] = "fixed"
-    heading_deg: Degrees = Field(0.0, description="rolling direction δ")
-
-    @property
-    def heading(self) -> float:
-        """Rolling direction δ, rad."""
-        return math.radians(self.heading_deg)
-
-
-class _RollerWheel(_PlacedWheel):
-    max_speed: Speed = Field(description="largest rolling speed, m/s")
-    max_acceleration: Acceleration | None = Field(None, description="m/s²")
-    heading_deg: Degrees = Field(0.0, description="rolling direction δ")
-
-    @property
-    def heading(self) -> float:
-        """Rolling direction δ, rad."""
-        return math.radians(self.heading_deg)
-
-
-class MecanumWheel(_RollerWheel):
-    """A Mecanum wheel: rollers at an angle to the axle."""
-
-    type: Literal["mecanum"] = "mecanum"
-    roller_deg: RollerDegrees = Field(
-        description="angle γ from the rolling direction to the driven direction; ±45"
-    )
-
-    @property
-    def roller(self) -> float:
-        """Roller angle γ, rad."""
-        return math.radians(self.roller_deg)
-
-
-class OmniWheel(_RollerWheel):
-    """An omni wheel: a Mecanum wheel with γ = 0."""
-
-    type: Literal["omni"] = "omni"
-
-    @property
-    def roller(self) -> float:
-        """Roller angle γ, rad: 0."""
-        return 0.0
-
-
-class Castor(_PlacedWheel):
-    """A passive castor: carries load, constrains nothing."""
-
-    type: Literal["castor"] = "castor"
-
-
-Wheel: TypeAlias = Annotated[
-    SteeredWheel | Turntable | FixedWheel | MecanumWheel | OmniWheel | Castor,
-    Field(discriminator="type"),
-]
-
-
-class Limits(_Model):
-    """Limits of the whole vehicle; a missing limit is no limit."""
-
-    max_speed: Speed | None = Field(None, description="speed of K, m/s")
-    max_reverse_speed: Speed | None = Field(
-        None, description="speed of K where v_n < 0, m/s; max_speed holds as well"
-    )
-    max_yaw_rate_deg: DegreeRate | None = Field(None, description="|ω|, degrees/s")
-    max_lateral_acceleration: Acceleration | None = Field(
-        None, description="centripetal acceleration |v ω|, m/s²"
-    )
-    lateral_acceleration_at: Literal["reference", "center_of_gravity"] = Field(
-        "reference", description="the point whose centripetal acceleration is meant"
-    )
-    max_acceleration: Acceleration | None = Field(
-        None, description="increase of the speed of K, m/s²"
-    )
-    max_deceleration: Acceleration | None = Field(
-        None, description="decrease of the speed of K, m/s²"
-    )
-
-
-Point: TypeAlias = tuple[Metres, Metres]
-
-
-class Load(_Model):
-    """Mass and centre of gravity of vehicle and payload together."""
-
-    mass: Annotated[float, Field(gt=0, le=1e7, allow_inf_nan=False)] | None = Field(
-        None, description="kg, for people: it cancels out of tipping"
-    )
-    center_of_gravity: tuple[Metres, Metres, Height] = Field(
-        description="(x, y, z), m, in the file's frame; z above the ground"
-    )
-    tipping_factor: Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)] = Field(
-        1.0, description="safety factor on the accelerations"
-    )
-
-
-class Guaranteed(_Model):
-    """Change rates that every permitted configuration must offer."""
-
-    kappa_rate: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = Field(
-        0.0, description="|dκ_n/dt|, 1/s"
-    )
-    beta_rate_deg: Annotated[float, Field(ge=0, le=1e5, allow_inf_nan=False)] = Field(
-        0.0, description="|dβ/dt|, degrees/s"
-    )
-
-
-class SkidSteer(_Model):
-    """A skid-steered vehicle, modelled as a differential drive."""
-
-    effective_track: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
-        description="track of the differential drive that turns alike, m"
-    )
-
-
-class Vehicle(_Model):
+class Vehicle(FileModel):
     """One vehicle type. Build one with `load_vehicle`."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,63}$")

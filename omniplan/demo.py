@@ -65,7 +65,9 @@ def show(rankings: Sequence[Ranking], console: Console) -> None:
 
 def verdict_table(rankings: Sequence[Ranking]) -> Table:
     """Return the table of manoeuvres and vehicles."""
-    table = Table(title="Who can drive what, and how fast", title_justify="left")
+    table = Table(
+        title="Who can drive what, and how fast", title_justify="left", pad_edge=False
+    )
     table.add_column("manoeuvre", no_wrap=True)
     for name in DEMO_FLEET:
         table.add_column(name.replace("-", "-\n", 1), justify="right")

@@ -63,7 +63,9 @@ class Violation:
     None: the bound itself."""
     excess_at_samples: float | None = None
     """Largest `excess` at the samples themselves within the stretch, 0 if the limit is
-    broken between them only; None where that was not told apart."""
+    broken between them only; None where that was not told apart. In a report in which
+    no limit is broken at a sample: where the intervals between them are halved evenly
+    until one is. At most 1e6."""
 
     @property
     def excess(self) -> float:
@@ -134,8 +136,9 @@ class Report:
     def headline(self) -> Violation | None:
         """The most telling violation, None if valid.
 
-        Proved ones first, then what no other speed would mend, then the largest excess
-        at the samples: that does not depend on where motions are cut to prove limits.
+        Proved ones first, then those at the samples, then what no other speed would
+        mend, then the largest excess at the samples: none of that depends on where
+        motions are cut to prove limits.
         Excesses that differ by rounding only are a tie: then a limit of a wheel comes
         before one of the vehicle, the first limit and wheel by name, the earliest
         place.
@@ -216,9 +219,10 @@ TIE = 1e-9
 """Excesses that differ by less, relative to the utilisation, are alike."""
 
 
-def _rank(violation: Violation) -> tuple[bool, int]:
+def _rank(violation: Violation) -> tuple[bool, bool, int]:
     order = (*SHAPE_LIMITS, violation.limit).index(violation.limit)
-    return not violation.is_proved, order
+    between = violation.excess_at_samples == 0
+    return not violation.is_proved, between, order
 
 
 def _told_excess(violation: Violation) -> float:

@@ -142,7 +142,7 @@ def _with_standstills(stretches: Trace, proved: Proved) -> Trace:
         if change.time <= 0:
             continue
         left = 1 - change.time / max(stop.t1 - stop.t0, 1e-9)
-        at = int(np.searchsorted(stretches.t[:, 0], stop.t1, side="left"))
+        at = int(np.searchsorted(stretches.t[:, 0], stop.between[1], side="left"))
         kappa_n, beta = np.array([change.start, change.goal]).T
         wheel = proved.judge.wheel_ids[change.wheel] if change.wheel >= 0 else None
         stretches = Trace(

@@ -24,6 +24,7 @@ from omniplan.judging.rows import Judge, Tolerances
 from omniplan.judging.violations import (
     find_violations,
     reconfiguration_violations,
+    told_between,
     unreachable_violations,
 )
 from omniplan.motion import Motion, PoseMotion
@@ -158,6 +159,9 @@ def report_of(proved: Proved) -> Report:
         *reconfiguration_violations(choice, judge, trajectory, motion, space),
         *unreachable_violations(choice, judge, trajectory, motion, space),
     ]
+    violations = told_between(
+        violations, proved.proof.evaluate, proved.first, choice, judge
+    )
     violations.sort(key=lambda v: (v.t_start, v.limit, v.wheel or ""))
     margin, tightest, factor = _margins(parts, choice, judge)
     top_speed, top_yaw_rate = _tops(parts, judge, motion, space)

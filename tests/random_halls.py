@@ -6,8 +6,7 @@ import numpy as np
 import shapely  # noqa: TID251
 
 from configspace import Vehicle, vehicle_from_data
-from configspace.testing import random_vehicle
-from configspace.testing_vehicles import VehicleKind
+from configspace.testing import VehicleKind, random_vehicle
 
 Corners = list[tuple[float, float]]
 

@@ -1,8 +1,9 @@
 """The most telling limit of a refused pair, in numba: `Report.headline`.
 
-What no other speed would mend comes first, then the largest excess at the samples: over
-the intervals between samples as a whole, which `validate` and the kernels have in
-common, wherever else they cut a motion.
+What is broken at the samples comes first, of that what no other speed would mend, then
+the largest excess there: over the intervals between samples as a whole, which
+`validate` and the kernels have in common, wherever else they cut a motion. Where
+nothing is broken at a sample the intervals are halved evenly until something is.
 """
 # mypy: disallow-untyped-decorators = False
 
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from omniplan.batch.chords import LOW
+from omniplan.batch.chords import HIGH, LOW
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import (
     BOUND,
@@ -22,24 +23,34 @@ from omniplan.batch.kinds import (
     RANGE,
     RANGE_ERROR,
     SIGN,
-    SINGULAR,
     SLIP,
 )
-from omniplan.batch.motions import LANES
-from omniplan.batch.refine import KEPT, NO, YES, largest, load, one_row, refine
+from omniplan.batch.motions import LANES, enclose
+from omniplan.batch.refine import (
+    KEPT,
+    STACK,
+    YES,
+    largest,
+    load,
+    one_row,
+    swing_halves,
+)
 from omniplan.batch.swings import is_wide, load_swings
-from omniplan.judging.proof import MAX_HALVINGS
+from omniplan.judging.violations import FINEST
 from omniplan.report import SHAPE_LIMITS, TIE
+from omniplan.standing.standstill import BETWEEN
 
-__all__ = ["NOWHERE", "headline", "is_driven", "told"]
+__all__ = ["FINEST", "NOWHERE", "count_faults", "headline", "is_driven", "told"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
 CLASSES = len(SHAPE_LIMITS)
 """Number of the last class: limits that driving slower mends."""
 NOWHERE, UNTOLD = -1, -2
-"""Instead of a row: none is broken at a sample; `validate` has to tell."""
-PROVING = np.int64(MAX_HALVINGS)
+"""Instead of a row: none is broken where it was looked; `validate` has to tell."""
+MAX_ROUNDS = 1 << 12
+"""So often parts are halved for one row, sixteen at a time, before `validate` is asked.
+"""
 START, END = 15 * LANES, 16 * LANES
 """Where the scratch array has the times of a block."""
 
@@ -65,23 +76,87 @@ def _keep_largest(
 ) -> float:  # fmt: skip
     """Take what a block reaches in its intervals from `begin` to `end`; the largest."""
     for k in range(LANES):
-        low, t0 = s[LOW + k], s[START + k]
-        if low <= KEPT or low < best * (1 - TIE):
+        best = _keep(s, k, knot_of[b, k], begin, end, best, place)
+    return best
+
+
+@kernel(inline="always")
+def _keep(
+    s: Array, k: int, knot: int, begin: float, end: float, best: float, place: Array
+) -> float:
+    """Take what a lane reaches if it is more, or as much and earlier."""
+    low, t0 = s[LOW + k], s[START + k]
+    if low <= KEPT or low < best * (1 - TIE):
+        return best
+    middle = (t0 + s[END + k]) / 2
+    if middle <= begin or middle >= end:
+        return best
+    if low > best * (1 + TIE) or t0 < place[1]:
+        place[0], place[1], place[2] = knot, t0, s[END + k]
+    return float(max(best, low))
+
+
+@kernel()
+def _between_samples(
+    blocks: Array, knot_of: Array, those_blocks: Array, knots: Array, form: int,
+    rows: Array, r: int, vehicle: Array, tolerances: Array, s: Array, stack: Array,
+    knot_at: Array, begin: float, end: float, level: int, best: float, place: Array,
+) -> float:  # fmt: skip
+    """Largest utilisation of a row where intervals are cut in 2^level parts.
+
+    Blocks of whole intervals, of which those of `those_blocks` count; otherwise as
+    `_at_samples`. What keeps the limit for sure is not cut further. -1 if that takes
+    too many parts.
+    """
+    wide, rounds = is_wide(rows[r, KIND]), 0
+    view = s.reshape(-1, LANES)
+    depths, those = stack[STACK:], knot_at[STACK:]
+    for b in range(blocks.shape[0]):
+        if not those_blocks[b]:
             continue
-        middle = (t0 + s[END + k]) / 2
-        if middle <= begin or middle >= end:
-            continue
-        if low > best * (1 + TIE) or t0 < place[1]:
-            place[0], place[1], place[2] = knot_of[b, k], t0, s[END + k]
-        best = max(best, low)
+        load(blocks, b, s)
+        if wide:
+            load_swings(blocks, b, s)
+        one_row(s, rows, r, vehicle, tolerances, YES)
+        waiting = 0
+        for k in range(LANES):
+            if s[HIGH + k] > KEPT:
+                stack[waiting, 0], stack[waiting, 1] = s[START + k], s[END + k]
+                stack[waiting, 2], knot_at[waiting] = 0, knot_of[b, k]
+                waiting += 1
+        while waiting > 0:
+            rounds += 1
+            if rounds > MAX_ROUNDS or waiting + LANES > STACK:
+                return -1.0
+            taken = min(waiting, LANES // 2)
+            waiting -= taken
+            for i in range(taken):
+                t0, t1 = stack[waiting + i, 0], stack[waiting + i, 1]
+                depths[i, 2], those[i] = stack[waiting + i, 2] + 1, knot_at[waiting + i]
+                half = (t0 + t1) / 2
+                enclose(knots[those[i]], form, t0, half, view, 2 * i)
+                enclose(knots[those[i]], form, half, t1, view, 2 * i + 1)
+            if wide:
+                swing_halves(knots, form, those, view, taken, s)
+            one_row(s, rows, r, vehicle, tolerances, YES)
+            for k in range(2 * taken):
+                if depths[k // 2, 2] == level:
+                    best = _keep(s, k, those[k // 2], begin, end, best, place)
+                elif s[HIGH + k] > KEPT:
+                    stack[waiting, 0], stack[waiting, 1] = s[START + k], s[END + k]
+                    stack[waiting, 2], knot_at[waiting] = (
+                        depths[k // 2, 2],
+                        those[k // 2],
+                    )
+                    waiting += 1
     return best
 
 
 @kernel()
 def _at_samples(
-    blocks: Array, knot_of: Array, samples: tuple[Array, ...], rows: Array, r: int,
-    vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
-    begin: float, end: float, best: float, floor: float, place: Array,
+    blocks: Array, knot_of: Array, plain: Array, wholes: Array, whole_knot: Array,
+    rows: Array, r: int, vehicle: Array, tolerances: Array, s: Array, highs: Array,
+    skipped: Array, begin: float, end: float, best: float, floor: float, place: Array,
 ) -> float:  # fmt: skip
     """Largest utilisation of a row at the samples; 0 if none breaks the limit.
 
@@ -89,7 +164,6 @@ def _at_samples(
     and where it may be more than `floor`. `place` gets knot, start and end of the first
     of the intervals.
     """
-    plain, wholes, whole_knot = samples
     count, wide = blocks.shape[0], is_wide(rows[r, KIND])
     error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
     floor, others = max(KEPT, floor), 0.0
@@ -131,36 +205,53 @@ def _window(blocks: Array, ends: Array, pieces: int, p: int) -> tuple[float, flo
 
 
 @kernel()
-def headline(
-    blocks: Array, knot_of: Array, count: int, knots: Array, form: int,
-    samples: tuple[Array, ...], rows: Array, order: Array, vehicle: Array,
-    tolerances: Array, s: Array, highs: Array, skipped: Array,
-    halves: tuple[Array, Array], stack: Array, knot_at: Array, high: Array,
-    place: Array, ends: Array, pieces: int, signs: Array,
-) -> tuple[int, float]:  # fmt: skip
-    """Return the row that tells why a pair is refused, and what it reaches.
+def count_faults(
+    blocks: Array, knot_of: Array, samples: tuple[Array, ...], rows: Array,
+    vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
+    high: Array, spot: Array, ends: Array, pieces: int, by_piece: Array,
+) -> None:  # fmt: skip
+    """Count the limits that pieces break at the samples, as `standstill` does.
 
-    `NOWHERE` if no limit is broken at a sample, though one that driving slower mends
-    may be between them; `UNTOLD` if it depends on what else is broken between samples
-    only, which is left to `validate`. `place` gets, behind the rows, knot, start and
-    end of an interval.
-
-    Parameters
-    ----------
-    samples
-        Which blocks hold whole intervals between samples, the other intervals as
-        blocks, and the knots of those.
-    order : (r, 2) int
-        Class of each row, and its place in the alphabet.
-    high : (r,) float
-        What each row never exceeds.
-    ends, pieces, signs
-        First and last part of the pieces, and the representation of each.
+    Only where both representations break some: the first column of `by_piece`. Limits
+    that hold for both count for neither.
     """
+    plain, wholes, whole_knot, _ = samples
+    for p in range(pieces):
+        if by_piece[p, 0, 0] == 0.0 or by_piece[p, 1, 0] == 0.0:
+            continue
+        by_piece[p, 0, 0] = by_piece[p, 1, 0] = 0.0
+        begin, end = _window(blocks, ends, pieces, p)
+        common = False
+        for r in range(rows.shape[0]):
+            error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+            sign = rows[r, SIGN]
+            if high[r] + error <= KEPT or (sign == 0 and common):
+                continue
+            best = _at_samples(
+                blocks, knot_of, plain, wholes, whole_knot, rows, r, vehicle,
+                tolerances, s, highs, skipped, begin, end, 0.0, 0.0, spot,
+            )  # fmt: skip
+            if best > KEPT and sign != 0:
+                by_piece[p, 0 if sign > 0 else 1, 0] += 1.0
+            common |= best > KEPT and sign == 0
+        for side in range(2):
+            if by_piece[p, side, 0] == 0.0 and not common:
+                by_piece[p, side, 0] = BETWEEN
+
+
+@kernel()
+def _most_telling(
+    blocks: Array, knot_of: Array, knots: Array, form: int, samples: tuple[Array, ...],
+    rows: Array, order: Array, vehicle: Array, tolerances: Array, s: Array,
+    highs: Array, skipped: Array, stack: Array, knot_at: Array, high: Array,
+    place: Array, ends: Array, pieces: int, signs: Array, level: int,
+) -> tuple[int, float]:  # fmt: skip
+    """Return the row to tell where intervals are cut in 2^level parts."""
     n, steers = rows.shape[0], vehicle[3] > 0
     there, spot = place[n], place[n + 1]
+    plain, wholes, whole_knot, all_wholes = samples
     for c in range(CLASSES + 1):
-        which, most, reached, is_open = -1, 0.0, 0.0, False
+        which, most, reached = NOWHERE, 0.0, 0.0
         for r in range(n):
             error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
             if order[r, 0] != c or high[r] + error <= KEPT:
@@ -174,12 +265,24 @@ def headline(
                 begin, end = (-np.inf, np.inf)
                 if sign != 0:
                     begin, end = _window(blocks, ends, pieces, p)
-                best = _at_samples(
-                    blocks, knot_of, samples, rows, r, vehicle, tolerances, s, highs,
-                    skipped, begin, end, best, floor, spot,
+                if level == 0:
+                    best = _at_samples(
+                        blocks, knot_of, plain, wholes, whole_knot, rows, r, vehicle,
+                        tolerances, s, highs, skipped, begin, end, best, floor, spot,
+                    )  # fmt: skip
+                    continue
+                best = _between_samples(
+                    blocks, knot_of, plain, knots, form, rows, r, vehicle, tolerances,
+                    s, stack, knot_at, begin, end, level, best, spot,
                 )  # fmt: skip
+                if best >= 0.0:
+                    best = _between_samples(
+                        wholes, whole_knot, all_wholes, knots, form, rows, r, vehicle,
+                        tolerances, s, stack, knot_at, begin, end, level, best, spot,
+                    )  # fmt: skip
+                if best < 0.0:
+                    return UNTOLD, 0.0
             ratio = told(rows, r, best)
-            is_open |= best <= KEPT
             if best <= KEPT or (which >= 0 and ratio < most * (1 - TIE)):
                 continue
             first = which < 0 or ratio > most * (1 + TIE)
@@ -189,24 +292,41 @@ def headline(
                     there[i] = spot[i]
             most = max(most, ratio)
         if which >= 0:
-            # Of wheels on their singular point none tells more than another.
-            return (which, reached) if c > 0 or not is_open else (UNTOLD, reached)
-        if c == CLASSES:
-            break
-        for r in range(n if is_open else 0):
-            if order[r, 0] != c or high[r] <= KEPT:
-                continue
-            sign = rows[r, SIGN]
-            for p in range(pieces if sign != 0 else 1):
-                if sign != 0 and not is_driven(sign, pieces, signs, steers, p):
-                    continue
-                first, last = (NO, count) if sign == 0 else (ends[p, 0], ends[p, 1])
-                low, top, is_clear = refine(
-                    blocks, knot_of, count, knots, form, rows, r, vehicle, tolerances,
-                    s, highs, skipped, halves, stack, knot_at, first, last, KEPT,
-                    PROVING, NO, spot,
-                )  # fmt: skip
-                on_wheel = rows[r, KIND] == SINGULAR and top == np.inf
-                if low > KEPT or not (is_clear or on_wheel):
-                    return UNTOLD, 0.0
+            return which, reached
+    return NOWHERE, 0.0
+
+
+@kernel()
+def headline(
+    blocks: Array, knot_of: Array, knots: Array, form: int, samples: tuple[Array, ...],
+    rows: Array, order: Array, vehicle: Array, tolerances: Array, s: Array,
+    highs: Array, skipped: Array, stack: Array, knot_at: Array, high: Array,
+    place: Array, ends: Array, pieces: int, signs: Array, finest: int,
+) -> tuple[int, float]:  # fmt: skip
+    """Return the row that tells why a pair is refused, and what it reaches.
+
+    `NOWHERE` if no limit is broken at the samples, nor where intervals are halved
+    `finest` times; `UNTOLD` if that takes too many parts. `place` gets, behind the
+    rows, knot, start and end of an interval.
+
+    Parameters
+    ----------
+    samples
+        Which blocks hold whole intervals between samples, the other intervals as
+        blocks, the knots of those, and true for each of them.
+    order : (r, 2) int
+        Class of each row, and its place in the alphabet.
+    high : (r,) float
+        What each row never exceeds.
+    ends, pieces, signs
+        First and last part of the pieces, and the representation of each.
+    finest : int
+    """
+    for level in range(finest + 1):
+        which, reached = _most_telling(
+            blocks, knot_of, knots, form, samples, rows, order, vehicle, tolerances, s,
+            highs, skipped, stack, knot_at, high, place, ends, pieces, signs, level,
+        )  # fmt: skip
+        if which != NOWHERE:
+            return which, reached
     return NOWHERE, 0.0

@@ -68,6 +68,7 @@ SCHEMA = pa.schema(
         pa.field("value", pa.float64()),
         pa.field("bound", pa.float64()),
         pa.field("unit", _TEXT),
+        pa.field("u", pa.float64()),
     ]
 )
 
@@ -118,6 +119,9 @@ def validate_many(
             Of a refused pair the sample, s, at which the limit is broken most, and by
             how much. The headline of a `Report` may have a worse place between two
             samples in the same stretch.
+        ``u``
+            How far along a path the limit is met, m (`Path.parameter`), where rows are
+            of paths (`PathBatch`) and the path has no timing; otherwise null.
 
         The metadata count the pairs (``omniplan.pairs``) and those that `validate`
         was asked for (``omniplan.asked``).
@@ -397,6 +401,7 @@ class _Verdicts:
                     for x in (self.t, self.value, self.bound)
                 ),
                 unit,
+                pa.nulls(label.size, pa.float64()),
             ],
             schema=SCHEMA,
         )

@@ -28,8 +28,9 @@ class PathBatch:
 
     What has times, or has been given them, is judged as in a `Batch`. A path for which
     a vehicle has no timing is not valid; its row has the limit and the wheel that are
-    in the way, or ``VEHICLE_NOT_KNOWN`` for a data sheet alone, an infinite duration,
-    the margin NaN and no numbers: `omniplan.select` has them.
+    in the way and how far along the path, ``u``, or ``VEHICLE_NOT_KNOWN`` for a data
+    sheet alone, an infinite duration, the margin NaN and no numbers: `omniplan.select`
+    has them.
     """
 
     motions: Sequence[Trajectory | Path]
@@ -106,4 +107,5 @@ def _row(name: str, answer: Undrivable) -> dict[str, Any]:
         "duration": math.inf,
         "limit": "VEHICLE_NOT_KNOWN" if fault is None else fault.limit,
         "wheel": None if fault is None else fault.wheel,
+        "u": None if fault is None else fault.u,
     }

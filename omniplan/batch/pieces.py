@@ -27,7 +27,7 @@ from omniplan.batch.chords import (
 )
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import ANGLE, AT, KIND, RANGE, SINGULAR
-from omniplan.batch.motions import LANES
+from omniplan.batch.motions import LANES, enclose
 from omniplan.batch.refine import load
 from omniplan.batch.rests import CHANGES, CLEAR, OPEN, change_at
 from omniplan.standing.winding_search import SHORT_REST
@@ -36,14 +36,44 @@ __all__ = ["MAX_PIECES", "angle_of", "choose", "pieces_of"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
+ROUNDS = 6
+"""So often what may stand is cut in sixteen parts."""
 MAX_PIECES = 24
 """Motions with more pieces between standstills are left to `validate`."""
 
 
 @kernel()
+def _moves(
+    knot: Array, form: int, t0: float, t1: float, vehicle: Array, tolerances: Array,
+    s: Array,
+) -> bool:  # fmt: skip
+    """Return whether the vehicle surely moves all over a part.
+
+    What may stand is cut again, as one stretch.
+    """
+    view = s.reshape(-1, LANES)
+    for _ in range(ROUNDS):
+        for k in range(LANES):
+            enclose(
+                knot, form, t0 + (t1 - t0) * k / LANES,
+                t0 + (t1 - t0) * (k + 1) / LANES, view, k,
+            )  # fmt: skip
+        body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
+        first, last = LANES, -1
+        for k in range(LANES):
+            if s[SLOW + k] <= tolerances[0]:
+                first, last = min(first, k), k
+        if last < 0:
+            return True
+        t0, t1 = view[15, first], view[16, last]
+    return False
+
+
+@kernel()
 def pieces_of(
-    blocks: Array, count: int, vehicle: Array, tolerances: Array, s: Array, ends: Array
-) -> int:
+    blocks: Array, knot_of: Array, knots: Array, form: int, count: int, vehicle: Array,
+    tolerances: Array, s: Array, ends: Array,
+) -> int:  # fmt: skip
     """Write first and last part of every piece; -1 if they are not clear.
 
     Not clear is a motion that may stand for a moment without coming to rest, which
@@ -61,6 +91,13 @@ def pieces_of(
             v0 = max(s[NA + k], abs(s[V0 + 2 * LANES + k]) / vehicle[2])
             v1 = max(s[NB + k], abs(s[V1 + 2 * LANES + k]) / vehicle[2])
             is_slow = s[SLOW + k] <= tolerances[0]
+            if is_slow and v0 > tolerances[0] and v1 > tolerances[0]:
+                t0, t1 = s[15 * LANES + k], s[16 * LANES + k]
+                is_slow = not _moves(
+                    knots[knot_of[b, k]], form, t0, t1, vehicle, tolerances, s
+                )
+                load(blocks, b, s)
+                body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
             # Slow it may be as long as it leaves a standstill or comes to one.
             leaving = leaving and is_slow and v1 >= v0
             if arriving and not (is_slow and v1 <= v0):
@@ -90,8 +127,8 @@ def angle_of(s: Array, lane: int, at_end: bool, sign: float, middle: float) -> f
 def _continues(
     blocks: Array, rows: Array, s: Array, last: int, first: int, before: float,
     after: float, alignment: float,
-) -> int:  # fmt: skip
-    """Whether all wheels stand alike before and after a standstill; -1 if nearly so."""
+) -> bool:  # fmt: skip
+    """Whether all wheels surely stand alike before and after a standstill."""
     worst = 0.0
     for r in range(rows.shape[0]):
         if rows[r, KIND] != SINGULAR:
@@ -110,9 +147,7 @@ def _continues(
         if not ranged:
             turn = math.atan2(math.sin(turn), math.cos(turn))
         worst = max(worst, abs(turn))
-    if worst <= 0.9 * alignment:
-        return 1
-    return 0 if worst > 1.1 * alignment else -1
+    return worst <= alignment / 2
 
 
 @kernel(inline="always")
@@ -140,6 +175,7 @@ def choose(
     at the standstills between: `changes` (pieces, 2, 2, CHANGES) gets that, by the
     representations before and after. False if it is not known.
     """
+    whole = knot_of[0, 0], knot_of[knot_of.shape[0] - 1, LANES - 1]
     # Cost and path (a bit per piece, 1 backwards) per last sign.
     cost, path = (np.inf, np.inf), (np.int64(0), np.int64(0))
     for p in range(pieces):
@@ -163,8 +199,8 @@ def choose(
                     )
                     for i in range(CHANGES):
                         change[i] = 0.0
-                    change[0] = CLEAR if goes_on > 0 else OPEN
-                    if goes_on <= 0:
+                    change[0] = CLEAR if goes_on else OPEN
+                    if not goes_on:
                         continue
                 elif change[0] == CLEAR:
                     continue
@@ -174,9 +210,13 @@ def choose(
                     if cost[before] + _price(change, before != after) + floor > best:
                         continue
                     change_at(
-                        knots[knot_of[last // LANES, last % LANES]],
-                        knots[knot_of[first // LANES, first % LANES]], form, own,
-                        own_rows, rows, vehicle, tolerances, s, change,
+                        knots,
+                        (
+                            knot_of[last // LANES, last % LANES],
+                            knot_of[first // LANES, first % LANES],
+                        ),
+                        whole, form, own, own_rows, rows, vehicle, tolerances, s,
+                        change,
                     )  # fmt: skip
                 price = cost[before] + _price(change, before != after)
                 way = 2 * path[before] + after

@@ -31,6 +31,7 @@ __all__ = [
     "one_row",
     "refine",
     "sweep",
+    "swing_halves",
 ]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
@@ -200,7 +201,7 @@ def _halve(
 
 
 @kernel()
-def _swing_halves(
+def swing_halves(
     knots: Array, form: int, those: Array, view: Array, taken: int, s: Array
 ) -> None:
     """Write how directions swing over the halves of parts."""
@@ -318,7 +319,7 @@ def refine(
                 int(2 * halved[i, 1]), blocks.shape[0] * LANES, halves, view, 2 * i,
             )  # fmt: skip
         if is_wide(rows[r, KIND]):
-            _swing_halves(knots, form, those, view, taken, s)
+            swing_halves(knots, form, those, view, taken, s)
         one_row(s, rows, r, vehicle, tolerances, YES if is_proof else NO)
         off = 0.0 if is_proof else error  # of the quick arc cosine
         waiting = base

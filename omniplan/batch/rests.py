@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from omniplan.batch.chords import FAST, NA, NB, V0, V1, body
-from omniplan.batch.kinds import ANGLE, KIND, OWN_RANGE, SINGULAR
-from omniplan.batch.motions import FIELDS, LANES, POSES, enclose
+from omniplan.batch.chords import FAST, LOW, SWUNG, V0, body
+from omniplan.batch.kinds import ANGLE, KIND, OWN_RANGE, SINGULAR, ZONE
+from omniplan.batch.motions import FIELDS, KNOT, LANES, OWN, enclose
+from omniplan.batch.refine import YES, one_row
 from omniplan.batch.ways import change_time, direction_of, least_time
-from omniplan.judging.proof import MAX_HALVINGS
+from omniplan.standing.rest import CUTS, DEEPEST
 
-__all__ = ["CHANGES", "CLEAR", "OPEN", "change_at"]
+__all__ = ["CHANGES", "CLEAR", "OPEN", "change_at", "edge_at"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
@@ -28,63 +29,115 @@ CLEAR, OPEN = 1.0, 2.0
 CHANGES = 5
 """Numbers per change: `CLEAR` or `OPEN`, the time it takes and the time there is, s;
 the middle of the standstill, s; the wheel that turns furthest, by its number."""
-REST = 1e-9
-"""Slower than this the splines of poses are at rest, m/s."""
 NEARLY = 1e-9
 """Relative rounding of times."""
+OUT = 1 + 1e-3
+"""Utilisation that no rounding explains."""
 
 
 @njit(cache=True, _nrt=True)
-def _rest(
-    knot: Array, form: int, at_end: bool, vehicle: Array, tolerances: Array, s: Array,
-    out: Array,
-) -> bool:  # fmt: skip
-    """Find where a motion comes to rest before the end of a knot, or starts after it.
+def _cut(a: float, b: float, i: int) -> float:
+    """Return the i-th of the times at which an interval is cut evenly."""
+    return a + (b - a) * i / CUTS if i < CUTS else b
 
-    The interval is halved towards the rest until the vehicle is taken to stand over
-    what is left. `out` gets that time and the most that it may be off by, if the parts
-    of `validate` are cut finer there, infinite if not known; then the velocity of K and
-    ω. Returns whether this is known.
+
+@njit(cache=True, _nrt=True)
+def _standing(
+    knot: Array, form: int, a: float, b: float, is_start: bool, vehicle: Array,
+    tolerances: Array, s: Array,
+) -> int:  # fmt: skip
+    """Count the parts of [a, b] that stand, one after the other, beside a standstill.
+
+    Those at its end if the standstill begins there, else those at its start.
     """
     view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
-    start, end = knot[12], knot[13]
-    t0, t1, found = start, end, False
-    for _ in range(MAX_HALVINGS):
-        if at_end:
-            t0 = (t0 + t1) / 2
-        else:
-            t1 = (t0 + t1) / 2
+    count = 0
+    for block in range(CUTS // LANES):
+        first = CUTS - (block + 1) * LANES if is_start else block * LANES
         for k in range(LANES):
+            t0, t1 = _cut(a, b, first + k), _cut(a, b, first + k + 1)
             enclose(knot, form, t0, t1, view, k)
         body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
-        if s[FAST] <= tolerances[0]:
-            found = True
-            break
-    last = s[NB] if at_end else s[NA]
-    omega = s[V1 + 2 * LANES] if at_end else s[V0 + 2 * LANES]
-    speed = max(last, abs(omega) / vehicle[2])
-    if not found or speed > (REST if form == POSES else 0.0):
-        return False
-    at = V0 if at_end else V1
-    w = s[at + 2 * LANES]
-    out[2] = s[at] - w * vehicle[1]
-    out[3] = s[at + LANES] + w * vehicle[0]
-    out[4] = w
-    out[0] = t0 if at_end else t1
-    # How far from the rest the vehicle may still be so slow.
-    size, far = t1 - t0, t1 - t0
-    while True:
-        far *= 2
-        if far > end - start:
-            out[1] = math.inf
-            return True
-        t = end - far if at_end else start + far
         for k in range(LANES):
-            enclose(knot, form, t, t, view, k)
-        body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
-        if s[FAST] > tolerances[0]:
+            if s[FAST + (LANES - 1 - k if is_start else k)] > tolerances[0]:
+                return count
+            count += 1
+    return count
+
+
+@njit(cache=True, _nrt=True)
+def _at(
+    knot: Array, form: int, t: float, vehicle: Array, tolerances: Array, s: Array,
+    out: Array,
+) -> bool:  # fmt: skip
+    """Write a time, the velocity of K and ω then; return whether the vehicle stands."""
+    view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
+    for k in range(LANES):
+        enclose(knot, form, t, t, view, k)
+    body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
+    w = s[V0 + 2 * LANES]
+    out[0], out[3] = t, w
+    out[1] = s[V0] - w * vehicle[1]
+    out[2] = s[V0 + LANES] + w * vehicle[0]
+    return bool(s[FAST] <= tolerances[0])
+
+
+@njit(cache=True, _nrt=True)
+def edge_at(
+    knots: Array, number: int, ends: tuple[int, int], form: int, is_start: bool,
+    vehicle: Array, tolerances: Array, s: Array, out: Array,
+) -> bool:  # fmt: skip
+    """Find where a standstill begins or ends, as `standing.rest.edge_of` does.
+
+    Parameters
+    ----------
+    knots : (k, KNOT) float
+    number : int
+        The knot that the piece beside the standstill ends in, or begins in.
+    ends : two ints
+        First and last knot of the motion.
+    form : {TWISTS, POSES}
+    is_start : bool
+        Whether the standstill begins there.
+    vehicle : (BODY,) float
+    tolerances : (4,) float
+    s : (ROOM,) float
+        Scratch.
+    out : (4,) float
+        Time, s; velocity of K, m/s; ω, rad/s.
+
+    Returns
+    -------
+    bool
+        False if the vehicle does not stand at the sample there.
+    """
+    a, b = knots[number, 12], knots[number, 13]
+    if not _at(
+        knots[number], form, b if is_start else a, vehicle, tolerances, s, out
+    ):  # fmt: skip
+        return False
+    level, is_known = 0, False
+    while True:
+        knot = knots[number]
+        count = _standing(knot, form, a, b, is_start, vehicle, tolerances, s)
+        was_known = is_known
+        if count == CUTS:
+            edge = a if is_start else b
+            if level > 0 or number == (ends[0] if is_start else ends[1]):
+                break
+            number += -1 if is_start else 1
+            is_known = True
+            a, b = knots[number, 12], knots[number, 13]
+            continue
+        is_known |= count > 0
+        row = CUTS - 1 - count if is_start else count
+        t0, t1 = _cut(a, b, row), _cut(a, b, row + 1)
+        edge = t1 if is_start else t0
+        if (was_known and level > 0) or level == DEEPEST:
             break
-    out[1] = far - size
+        a, b = t0, t1
+        level += 1
+    _at(knots[number], form, edge, vehicle, tolerances, s, out)
     return True
 
 
@@ -93,7 +146,7 @@ def _configuration(
     rest: Array, sign: float, vehicle: Array, tolerances: Array
 ) -> tuple[float, float]:
     """Return (κ_n, β) of a representation; of a vehicle bound to a line on it."""
-    x, y, q = sign * rest[2], sign * rest[3], sign * rest[4] / vehicle[2]
+    x, y, q = sign * rest[1], sign * rest[2], sign * rest[3] / vehicle[2]
     p, size = math.hypot(x, y), abs(q)
     kappa_n = 0.0
     if size < p:
@@ -138,16 +191,48 @@ def _furthest(own_rows: Array, vehicle: Array, corners: Array) -> tuple[int, flo
 
 
 @njit(cache=True, _nrt=True)
+def _is_out(
+    corners: Array, own_rows: Array, vehicle: Array, tolerances: Array, s: Array
+) -> bool:
+    """Return whether the wheels cannot stand as one of the corners asks, for sure.
+
+    Then no search finds a way.
+    """
+    view = s[: FIELDS * LANES].reshape(FIELDS, LANES)
+    s[SWUNG : SWUNG + 2 * LANES] = 0.0  # v_n = 0
+    knot, still = np.zeros(KNOT), tolerances.copy()
+    still[0] = -1.0  # a configuration is one even where the vehicle stands
+    for k in range(LANES):
+        kappa_n, beta = corners[k % 2]
+        knot[0], knot[2] = kappa_n, beta
+        knot[6] = 1.0 if abs(kappa_n) < 1 else 0.0
+        knot[7] = -1.0 if kappa_n < 0 else 1.0
+        knot[8], knot[9], knot[10] = vehicle[2], vehicle[0], vehicle[1]
+        enclose(knot, OWN, 0.0, 0.0, view, k)
+    for r in range(own_rows.shape[0]):
+        if own_rows[r, KIND] != OWN_RANGE and own_rows[r, KIND] != ZONE:
+            continue
+        one_row(s, own_rows, r, vehicle, still, YES)
+        if max(s[LOW], s[LOW + 1]) > OUT:
+            return True
+    return False
+
+
+@njit(cache=True, _nrt=True)
 def change_at(
-    before: Array, after: Array, form: int, signs: tuple[float, float], own_rows: Array,
-    rows: Array, vehicle: Array, tolerances: Array, s: Array, out: Array,
+    knots: Array, numbers: tuple[int, int], ends: tuple[int, int], form: int,
+    signs: tuple[float, float], own_rows: Array, rows: Array, vehicle: Array,
+    tolerances: Array, s: Array, out: Array,
 ) -> None:  # fmt: skip
     """Write what changing the configuration at a standstill takes: see `CHANGES`.
 
     Parameters
     ----------
-    before, after : (KNOT,) float
+    knots : (k, KNOT) float
+    numbers : two ints
         The knots in which the motion comes to rest and leaves it.
+    ends : two ints
+        First and last knot of the motion.
     form : {TWISTS, POSES}
     signs : two floats, {-1, 1}
         The representations before and after.
@@ -161,19 +246,19 @@ def change_at(
     """
     out[0] = OPEN
     out[1:] = 0.0
-    ends = np.empty((2, 5))
-    if not _rest(before, form, True, vehicle, tolerances, s, ends[0]):
-        return
-    if not _rest(after, form, False, vehicle, tolerances, s, ends[1]):
-        return
-    rest = ends[1, 0] - ends[0, 0]
-    longest = rest + ends[0, 1] + ends[1, 1]
+    edges = np.empty((2, 4))
+    for i in range(2):
+        if not edge_at(
+            knots, numbers[i], ends, form, i == 0, vehicle, tolerances, s, edges[i]
+        ):  # fmt: skip
+            return
+    rest = edges[1, 0] - edges[0, 0]
     corners = np.empty((2, 2))
     for i in range(2):
-        at = _configuration(ends[i], signs[i], vehicle, tolerances)
+        at = _configuration(edges[i], signs[i], vehicle, tolerances)
         corners[i, 0], corners[i, 1] = at
     wheel, turn = _furthest(own_rows, vehicle, corners)
-    out[2], out[3], out[4] = rest, (ends[0, 0] + ends[1, 0]) / 2, wheel
+    out[2], out[3], out[4] = rest, (edges[0, 0] + edges[1, 0]) / 2, wheel
     if abs(turn - tolerances[3]) <= 1e-6 * tolerances[3]:
         return
     if turn <= tolerances[3]:
@@ -186,9 +271,11 @@ def change_at(
     out[1] = time
     if time <= rest * (1 - NEARLY):
         out[0] = CLEAR
-    elif time > longest * (1 + NEARLY):
+    elif time > rest * (1 + NEARLY):
         # A search might find a quicker way, unless the wheels cannot be so quick.
         least = least_time(own_rows, rows, vehicle, corners, 0, 1, True)
-        needless = time < math.inf and least > longest * (1 + NEARLY)
+        needless = time < math.inf and least > rest * (1 + NEARLY)
+        if time == math.inf:
+            needless = _is_out(corners, own_rows, vehicle, tolerances, s)
         if needless or vehicle[4] == 0.0:
             out[0] = CLEAR

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from omniplan.batch.chords import LOW, NA, ROOM
-from omniplan.batch.headline import NOWHERE, headline, is_driven, told
+from omniplan.batch.headline import FINEST, count_faults, headline, is_driven, told
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import (
     ANGLE,
@@ -49,7 +49,9 @@ UNCLEAR, VALID, REFUSED = 0, 1, 2
 
 PROVING, SHARPENING = np.int64(MAX_HALVINGS), np.int64(SHARPENING_HALVINGS)
 STANDING = np.int64(SHAPE_LIMITS.index("RECONFIGURATION"))
-"""Rank of what is told of a standstill that is too short."""
+BEYOND = np.int64(SHAPE_LIMITS.index("UNREACHABLE"))
+"""Rank of what is told of a standstill that is too short, and of a piece that is apart.
+"""
 LEAST_WORST = 0.05
 """Utilisations below this are not sharpened, as in `Proof.sharpen`."""
 
@@ -160,7 +162,9 @@ def _judge(
     pieces = 1
     ends[0, 0], ends[0, 1], signs[0] = 0, count, 0
     if vehicle[3] > 0:
-        pieces = pieces_of(blocks, count, vehicle, tolerances, s, ends)
+        pieces = pieces_of(
+            blocks, knot_of, knots, form, count, vehicle, tolerances, s, ends
+        )
         if pieces < 0:
             return UNCLEAR, -1
     sweep(
@@ -174,6 +178,11 @@ def _judge(
         skipped, halves, stack, knot_at, low, high, place, ends, pieces, by_piece,
     ):  # fmt: skip
         return UNCLEAR, -1
+    if vehicle[3] > 0:
+        count_faults(
+            blocks, knot_of, samples, rows, vehicle, tolerances, s, highs, skipped,
+            high, place[n_rows], ends, pieces, by_piece,
+        )  # fmt: skip
     if vehicle[7] > 0 and not _components(
         blocks, knot_of, knots, rows, cells, vehicle, ends, pieces, low, by_piece
     ):
@@ -183,48 +192,47 @@ def _judge(
         pieces, by_piece, changes, signs,
     ):  # fmt: skip
         return UNCLEAR, -1
-    is_valid = True
+    keeps, apart = True, -1
     for r in range(n_rows):
         if rows[r, SIGN] == 0 and low[r] > KEPT:
-            is_valid = False
-    apart = -1
+            keeps = False
     for p in range(pieces):
         faults = by_piece[p, signs[p], 0] if vehicle[3] > 0 else 0.0
         if faults == UNREACHABLE:
             apart = p if apart < 0 else apart
         elif faults > 0:
-            is_valid = False
+            keeps = False
     short, used = _shortest(changes, signs, pieces)
-    is_valid &= used <= 1
-    if apart >= 0 and not is_valid:
-        return UNCLEAR, -1
+    is_valid, which = keeps and used <= 1, -1
+    out[0] = 1.0
     if is_valid:
         which = _margin(
             blocks, knot_of, count, knots, form, rows, vehicle, tolerances, s, highs,
             skipped, halves, stack, knot_at, low, high, place, ends, pieces, signs, out,
         )  # fmt: skip
-        if used > 1 - out[0]:
-            out[0], which = 1 - used, 2 * n_rows + 1
-        if apart >= 0:
-            part = ends[apart, 0]
-            out[1], out[3] = blocks[part // LANES, 15, part % LANES], 0.0
-            return REFUSED, 2 * n_rows
-        return VALID, which
-    which = _refusal(
-        blocks, knot_of, count, knots, form, samples, rows, order, vehicle, tolerances,
-        s, highs, skipped, halves, stack, knot_at, low, high, place, ends, pieces,
-        by_piece, signs, out,
-    )  # fmt: skip
-    is_short = 1 < used < np.inf
-    if which == NOWHERE and is_short:
-        which = -1
-    elif which < 0:
-        return UNCLEAR, -1
+    elif not keeps:
+        # What stands for a whole piece or a standstill comes before what is broken
+        # between samples only.
+        finest = FINEST if apart < 0 and not 1 < used < np.inf else 0
+        which = _refusal(
+            blocks, knot_of, knots, form, samples, rows, order, vehicle, tolerances, s,
+            highs, skipped, stack, knot_at, low, high, place, ends, pieces, by_piece,
+            signs, finest, out,
+        )  # fmt: skip
+        if which < 0 and finest > 0:
+            return UNCLEAR, -1
+    if used > 1 - out[0]:
+        out[0] = max(1 - used, -1e6)
+        which = 2 * n_rows + 1 if is_valid else which
+    if apart >= 0 and (is_valid or which < 0 or order[which, 0] > BEYOND):
+        part = ends[apart, 0]
+        out[1], out[3] = blocks[part // LANES, 15, part % LANES], 0.0
+        return REFUSED, 2 * n_rows
     if used > 1:
         change = changes[short, signs[short], signs[short + 1]]
         told: tuple[int, int] = _too_short(rows, order, change, used, which, out)
         return told
-    return REFUSED, which
+    return (VALID if is_valid else REFUSED), which
 
 
 @kernel()
@@ -275,7 +283,6 @@ def _too_short(
 ) -> tuple[int, int]:
     """Write that the wheels have too little time, unless something else tells more."""
     n_rows, is_proved = rows.shape[0], used < np.inf
-    out[0] = max(min(out[0], 1 - used), -1e6) if which >= 0 else max(1 - used, -1e6)
     if which >= 0 and (order[which, 0] < STANDING or not is_proved):
         return REFUSED, which
     out[1], out[3] = change[3], change[2]
@@ -326,30 +333,29 @@ def _margin(
 
 @kernel(inline="always")
 def _refusal(
-    blocks: Array, knot_of: Array, count: int, knots: Array, form: int,
-    samples: tuple[Array, ...], rows: Array, order: Array, vehicle: Array,
-    tolerances: Array, s: Array, highs: Array, skipped: Array,
-    halves: tuple[Array, Array], stack: Array, knot_at: Array, low: Array, high: Array,
-    place: Array, ends: Array, pieces: int, by_piece: Array, signs: Array, out: Array,
+    blocks: Array, knot_of: Array, knots: Array, form: int, samples: tuple[Array, ...],
+    rows: Array, order: Array, vehicle: Array, tolerances: Array, s: Array,
+    highs: Array, skipped: Array, stack: Array, knot_at: Array, low: Array, high: Array,
+    place: Array, ends: Array, pieces: int, by_piece: Array, signs: Array, finest: int,
+    out: Array,
 ) -> int:  # fmt: skip
-    """Write what refuses a pair and the margin; return the row of `headline`."""
+    """Write the margin and what refuses a pair; return the row of `headline`."""
     which: int
     which, worst = headline(
-        blocks, knot_of, count, knots, form, samples, rows, order, vehicle, tolerances,
-        s, highs, skipped, halves, stack, knot_at, high, place, ends, pieces, signs,
+        blocks, knot_of, knots, form, samples, rows, order, vehicle, tolerances, s,
+        highs, skipped, stack, knot_at, high, place, ends, pieces, signs, finest,
     )  # fmt: skip
-    if which < 0:
-        return which
     for r in range(rows.shape[0]):
         if rows[r, SIGN] == 0:
             worst = max(worst, low[r])
     for p in range(pieces if vehicle[3] > 0 else 0):
         worst = max(worst, by_piece[p, signs[p], 1])
     out[0] = max(1 - worst, -1e6)
-    _describe(
-        knots, form, rows, which, vehicle, tolerances, s, place[rows.shape[0]],
-        1.0 if rows[which, SIGN] >= 0 else -1.0, out[1:],
-    )  # fmt: skip
+    if which >= 0:
+        _describe(
+            knots, form, rows, which, vehicle, tolerances, s, place[rows.shape[0]],
+            1.0 if rows[which, SIGN] >= 0 else -1.0, out[1:],
+        )  # fmt: skip
     return which
 
 
@@ -417,7 +423,8 @@ def judge_pairs(
         if swings:
             parts = widened(parts, knot_of[first[n] : first[n + 1]], knots, forms[n])
             others = widened(others, their_knot, knots, forms[n])
-        of_samples = (is_plain[first[n] : first[n + 1]], others, their_knot)
+        all_others = np.ones(others.shape[0], np.bool_)
+        of_samples = (is_plain[first[n] : first[n + 1]], others, their_knot, all_others)
         of_motion = groups[first_group[n] : first_group[n + 1]]
         room = (
             np.zeros(ROOM),

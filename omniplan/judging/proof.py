@@ -31,6 +31,8 @@ MAX_HALVINGS = 24
 MAX_PARTS = 30_000
 """... or until there are so many more than there were; what is undecided then is
 refused."""
+AT_ONCE = 64
+"""Of so many new parts or fewer the halves are judged as well."""
 SHARPNESS = 1e-3
 """How sharply the worst utilisation is determined, relative ..."""
 SHARPENING_HALVINGS = 10
@@ -93,6 +95,23 @@ class Parts:
             np.concatenate([self.stands, others.stands])[order],
             picked(self.low, others.low),
             picked(self.high, others.high),
+        )
+
+    def taken(self, spans: Intervals, rows: IntArray) -> Parts:
+        """Return some of the parts.
+
+        Parameters
+        ----------
+        spans : Intervals
+            Of those.
+        rows : (n,) int
+        """
+        return Parts(
+            spans,
+            self.enclosure.rows(rows),
+            self.stands[rows],
+            {s: low[rows] for s, low in self.low.items()},
+            {s: high[rows] for s, high in self.high.items()},
         )
 
     def picked(self, sign: SignArray) -> tuple[FloatArray, FloatArray]:
@@ -161,13 +180,14 @@ class Proof:
             Called before parts are judged; what it raises ends the proof.
         """
         self._max_parts = MAX_PARTS if max_parts is None else max_parts
-        self._motion, self._judge, self._tolerances = motion, judge, tolerances
+        self.motion, self._judge, self._tolerances = motion, judge, tolerances
         self.is_own = motion.is_own
         ambiguous = judge.needs_configuration and not motion.is_own
         self.signs: tuple[int, ...] = (1, -1) if ambiguous else (1,)
         self._free_at_rest = np.array([row.is_free_at_rest for row in judge.rows])
         self._is_shape = np.array([row.scaling == "none" for row in judge.rows])
         self._checkpoint = checkpoint
+        self._ahead: _Ahead | None = None
         spans = self._whole = motion.intervals()
         self._step = spans.t1 - spans.t0
         self.cuts: list[BoolArray] = []
@@ -176,22 +196,28 @@ class Proof:
             self.cuts += cuts
         for need in self.cuts:
             spans = spans.halved(need)
-        self.parts = self._evaluate(spans)
+        self.parts = self.evaluate(spans)
         if not self.cuts:
             self.first = self.parts
 
     @cached_property
     def first(self) -> Parts:
         """The intervals of the motion, uncut."""
-        return self._evaluate(self._whole)
+        return self.evaluate(self._whole)
 
-    def _evaluate(self, spans: Intervals) -> Parts:
+    def evaluate(self, spans: Intervals) -> Parts:
+        """Return what is known of parts of the motion.
+
+        Parameters
+        ----------
+        spans : Intervals
+        """
         if self._checkpoint is not None:
             self._checkpoint()
-        part = self._motion.enclose(spans)
+        part = self.motion.enclose(spans)
         body = Chord.of(part, self._judge.reference)
         speed = speed_of(part, body, self._judge.kappa_g)[1] * part.scale_high
-        stands = (speed <= self._tolerances.standstill) & (not self._motion.is_own)
+        stands = (speed <= self._tolerances.standstill) & (not self.motion.is_own)
         low, high = {}, {}
         for sign, bounds in self._judge.utilisations(part, self.signs).items():
             low[sign], high[sign] = bounds
@@ -299,4 +325,34 @@ class Proof:
         order = np.where(is_new, need.size + np.cumsum(is_new) - 1, origin)
         spans = spans.halved(need)
         new = Intervals(spans.knot[is_new], spans.t0[is_new], spans.t1[is_new])
-        return self.parts.merged(self._evaluate(new), spans, order)
+        return self.parts.merged(self._halves(need, new, is_new), spans, order)
+
+    def _halves(self, need: BoolArray, new: Intervals, is_new: BoolArray) -> Parts:
+        """Return the new halves, which may have been judged in the last round.
+
+        Where few parts are judged it hardly takes longer to judge more of them at once,
+        so their own halves are judged with them: those that are halved again have
+        mostly just been made.
+        """
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None:
+            rows = ahead.first[need]
+            if (rows >= 0).all():
+                return ahead.parts.taken(new, np.stack([rows, rows + 1], -1).ravel())
+        if new.t0.size > AT_ONCE:
+            return self.evaluate(new)
+        quarters = new.halved(np.ones(new.t0.shape, dtype=bool))
+        both = self.evaluate(new.joined(quarters))
+        first = np.full(is_new.shape, -1)
+        first[is_new] = new.t0.size + 2 * np.arange(new.t0.size)
+        self._ahead = _Ahead(both, first)
+        return both.taken(new, np.arange(new.t0.size))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ahead:
+    """Halves that were judged before it was known whether they are needed."""
+
+    parts: Parts
+    first: IntArray
+    """(m,) where the two halves of each part are, -1: nowhere."""

@@ -172,7 +172,7 @@ class Swing:
     pieces: Callable[[], Pieces]
     """Gives the splines."""
 
-    def rows(self, rows: slice) -> Swing:
+    def rows(self, rows: slice | IntArray) -> Swing:
         """Return some of the parts."""
         return Swing(self.dt[rows], self.h[:, rows], self.knot[rows], self.pieces)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,18 +15,27 @@ from configspace.omni_curve import curvature_of_ratio
 from configspace.vehicle import SteerableWheel
 from omniplan.judging.proof import ROUNDING, Parts, refused
 from omniplan.judging.rows import Judge, Row
-from omniplan.motion import Enclosure, Motion, PoseMotion
+from omniplan.motion import Enclosure, Intervals, Motion, PoseMotion
 from omniplan.report import Violation
 from omniplan.standing.standstill import Choice
 from omniplan.trajectory import Trajectory
 
 __all__ = [
+    "FINEST",
     "find_violations",
     "reconfiguration_violations",
+    "told_between",
     "unreachable_violations",
 ]
 
 FloatArray = npt.NDArray[np.float64]
+
+FINEST = 12
+"""So often intervals are halved to tell what is broken between the samples ..."""
+MANY = 4096
+"""... unless so many parts are in question."""
+MOST = 1e6
+"""The largest excess that is told."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,7 @@ class _Describer:
     ) -> None:
         self._judge, self._trajectory = judge, trajectory
         self._motion, self._space = motion, space
+        self._poses: dict[float, tuple[float, float, float]] = {}
 
     def place(self, parts: Parts, part: int, at_end: bool, sign: int) -> _Place:
         """Return what is driven at one end of a part."""
@@ -127,8 +137,10 @@ class _Describer:
         """Return the pose at a time, if the trajectory has poses."""
         if not isinstance(self._motion, PoseMotion):
             return None
-        x, y, theta = self._motion.poses_at(np.array([t]))[0]
-        return float(x), float(y), float(theta)
+        if t not in self._poses:  # several limits may be broken at one place
+            x, y, theta = self._motion.poses_at(np.array([t]))[0]
+            self._poses[t] = float(x), float(y), float(theta)
+        return self._poses[t]
 
     def index(self, t: float) -> int:
         times = self._trajectory.t
@@ -209,19 +221,83 @@ def find_violations(
             violation = describer.violation(
                 row, place, span, ratio, is_proved=is_proved, angle=angle
             )
-            if is_proved and angle is None and row.bound > 0:
-                touched = (first.spans.t0 < span[1]) & (first.spans.t1 > span[0])
-                most = float(at_samples[touched, column].max(initial=0.0))
+            if is_proved and angle is None:
+                most = _largest(at_samples, first.spans, span, column)
                 violation = replace(violation, excess_at_samples=_excess(row, most))
             yield violation
 
 
+def told_between(
+    violations: Sequence[Violation],
+    evaluate: Callable[[Intervals], Parts],
+    first: Parts,
+    choice: Choice,
+    judge: Judge,
+) -> list[Violation]:
+    """Return violations with their excess where no limit is broken at a sample.
+
+    The intervals between the samples are halved evenly until some limit is, and so
+    what is told first does not depend on where they were cut to find that.
+
+    Parameters
+    ----------
+    violations : sequence of Violation
+    evaluate : callable
+        From spans to parts.
+    first : Parts
+        The intervals between the samples, as a whole.
+    choice : Choice
+    judge : Judge
+    """
+    proved = [v.excess_at_samples for v in violations if v.is_proved]
+    if not proved or any(excess != 0 for excess in proved):
+        return list(violations)
+    spans, parts = first.spans, first
+    for _ in range(FINEST):
+        _, high = parts.picked(choice.sign_of(spans))
+        is_open = (high > 1 + ROUNDING).any(axis=1)
+        if not is_open.any() or is_open.sum() > MANY:
+            break
+        spans = Intervals(spans.knot[is_open], spans.t0[is_open], spans.t1[is_open])
+        spans = spans.halved(np.ones(spans.t0.shape, dtype=bool))
+        parts = evaluate(spans)
+        low, _ = parts.picked(choice.sign_of(spans))
+        if (low > 1 + ROUNDING).any():
+            return [_told_at(v, low, spans, judge) for v in violations]
+    return list(violations)
+
+
+def _told_at(
+    violation: Violation, low: FloatArray, spans: Intervals, judge: Judge
+) -> Violation:
+    """Return a violation with its excess where the intervals are cut like that."""
+    if violation.excess_at_samples is None:
+        return violation
+    span, excess = (violation.t_start, violation.t_end), 0.0
+    for column, row in enumerate(judge.rows):
+        wheel = judge.wheel_ids[row.wheel] if row.wheel >= 0 else None
+        if (row.limit, wheel) == (violation.limit, violation.wheel):
+            excess = max(excess, _excess(row, _largest(low, spans, span, column)))
+    return replace(violation, excess_at_samples=excess)
+
+
+def _largest(
+    ratios: FloatArray, spans: Intervals, span: tuple[float, float], column: int
+) -> float:
+    """Return the largest utilisation of a row on the parts that a stretch touches."""
+    touched = (spans.t0 < span[1]) & (spans.t1 > span[0])
+    return float(ratios[touched, column].max(initial=0.0))
+
+
 def _excess(row: Row, ratio: float) -> float:
-    """Return how far a utilisation is beyond a limit, as `Violation.excess` has it."""
+    """Return how far a utilisation is beyond a limit, as `Violation.excess` has it.
+
+    Finite, so that a report can travel as JSON.
+    """
     if row.limit in {"FIXED_WHEEL", "PARALLEL_WHEELS"} and row.unit == "1":
         slip = math.asin(min(ratio * row.bound, 1.0))
         return max(slip / math.asin(row.bound) - 1, 0.0)
-    return max(ratio - 1, 0.0)
+    return min(max(ratio - 1, 0.0), MOST)
 
 
 def reconfiguration_violations(
@@ -314,10 +390,12 @@ def _worse_at_end(
     judge: Judge, parts: Parts, sign: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.bool_]:
     """Return whether each row is utilised more at the end of a part, (m, rows)."""
-    lows = [
-        Parts(parts.spans, part, parts.stands, *_bounds(judge, part)).picked(sign)[0]
-        for part in (_only(parts.enclosure, "0"), _only(parts.enclosure, "1"))
-    ]
+    e, m = parts.enclosure, len(parts.stands)
+    both = _only(e, "0").merged(_only(e, "1"), np.arange(2 * m))
+    bounds = judge.utilisations(both, tuple(parts.low))
+    low = {s: each[0] for s, each in bounds.items()}
+    ends = [{s: each[rows] for s, each in low.items()} for rows in _halves_of(m)]
+    lows = [replace(parts, low=end, high=end).picked(sign)[0] for end in ends]
     worse = np.asarray(lows[1] > lows[0], dtype=bool)
     for wheel in judge.winding_wheels:
         if wheel.column in parts.angles:
@@ -326,11 +404,8 @@ def _worse_at_end(
     return worse
 
 
-def _bounds(
-    judge: Judge, part: Enclosure
-) -> tuple[dict[int, FloatArray], dict[int, FloatArray]]:
-    found = judge.utilisations(part, (1, -1))
-    return ({s: b[0] for s, b in found.items()}, {s: b[1] for s, b in found.items()})
+def _halves_of(m: int) -> tuple[slice, slice]:
+    return slice(0, m), slice(m, 2 * m)
 
 
 def _only(part: Enclosure, end: str) -> Enclosure:

@@ -30,7 +30,7 @@ from omniplan.timing.path_motion import pieces_of
 from omniplan.timing.shape import shape_of
 from omniplan.timing.solver import TimingProblem
 
-__all__ = ["rounded_off"]
+__all__ = ["is_free", "rounded_off", "timed"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -98,8 +98,7 @@ def rounded_off(task: Task, permits: Permits, route: Route) -> tuple[Route, floa
     route : Route
     """
     corners = _Corners(task, permits)
-    cuts = [0, *route.stops, len(route.poses) - 1]
-    parts = [route.poses[a : b + 1] for a, b in itertools.pairwise(cuts)]
+    parts = _parts(route)
     known = [None if task.budget.is_late else corners.piece(part) for part in parts]
     done, driven, i = parts[:1], known[:1], 1
     while i < len(parts):
@@ -115,9 +114,40 @@ def rounded_off(task: Task, permits: Permits, route: Route) -> tuple[Route, floa
         i += used
     stops = np.cumsum([len(part) - 1 for part in done[:-1]]).tolist()
     poses = np.concatenate([done[0], *(part[1:] for part in done[1:])])
-    sure = [piece for piece in driven if piece is not None]
-    time = corners.with_stops(sure) if len(sure) == len(driven) else math.inf
-    return Route(locked(poses), tuple(stops)), time
+    return Route(locked(poses), tuple(stops)), corners.with_stops(driven)
+
+
+def timed(task: Task, permits: Permits, route: Route) -> float:
+    """Return the time of a route as `rounded_off` does, s; inf if not permitted.
+
+    Parameters
+    ----------
+    task : Task
+    permits : Permits
+    route : Route
+    """
+    corners = _Corners(task, permits)
+    return corners.with_stops([corners.piece(part) for part in _parts(route)])
+
+
+def is_free(task: Task, poses: FloatArray) -> bool:
+    """Return whether the arcs from pose to pose meet nothing.
+
+    Parameters
+    ----------
+    task : Task
+    poses : (n, 3) float, m, m, rad
+    """
+    checker = task.checker
+    return checker is None or all(
+        checker.is_motion_free(Move.arc(a, b)) for a, b in itertools.pairwise(poses)
+    )
+
+
+def _parts(route: Route) -> list[FloatArray]:
+    """Return the poses from stop to stop."""
+    cuts = [0, *route.stops, len(route.poses) - 1]
+    return [route.poses[a : b + 1] for a, b in itertools.pairwise(cuts)]
 
 
 def _going_on(before: FloatArray, after: FloatArray) -> FloatArray:
@@ -181,7 +211,7 @@ class _Corners:
             if length < SHORTEST:
                 return None
             poses = self._blended(before, after, length)
-            if poses is None or not self._is_free(poses):
+            if poses is None or not is_free(self._task, poses):
                 continue
             head = before.filled(0.0, float(before.u[-1]) - length)
             tail = _going_on(poses, after.filled(length, float(after.u[-1])))
@@ -190,8 +220,14 @@ class _Corners:
                 return piece
         return None
 
-    def with_stops(self, pieces: Sequence[_Piece]) -> float:
-        """Return the time of pieces with stops between them, s."""
+    def with_stops(self, pieces: Sequence[_Piece | None]) -> float:
+        """Return the time of pieces with stops between them, s; inf without one."""
+        sure = [piece for piece in pieces if piece is not None]
+        if len(sure) < len(pieces):
+            return math.inf
+        return self._with_stops(sure)
+
+    def _with_stops(self, pieces: Sequence[_Piece]) -> float:
         best = {pieces[0].ends[sign][1]: time for sign, time in pieces[0].times.items()}
         for piece in pieces[1:]:
             best = {
@@ -247,12 +283,6 @@ class _Corners:
             if all(speed > 0 for speed in speeds):
                 return True
         return False
-
-    def _is_free(self, poses: FloatArray) -> bool:
-        checker = self._task.checker
-        return checker is None or all(
-            checker.is_motion_free(Move.arc(a, b)) for a, b in itertools.pairwise(poses)
-        )
 
 
 def _aligned(a: FloatArray, b: FloatArray) -> float:

@@ -3,11 +3,12 @@
 What is tried depends on how freely the vehicle moves:
 
 ==========================  ========================================================
-only translates             the straight move, where the heading is kept
+keeps its heading           the straight move, two crab moves
 turns on the spot           the straight move, one arc, turn and translate, and turn,
                             drive along its axis, turn
 neither                     the straight move, one arc, Reeds-Shepp words at several
                             directions of travel, with the least radius permitted there
+only moves as it turns      the straight move with full turns more
 bound to a line             what of the above keeps to its line
 ==========================  ========================================================
 
@@ -55,22 +56,34 @@ CRABS = (0.0, 0.35, 0.7, 1.0)
 """Directions of travel at which words are tried, as shares of the largest |β|."""
 WIDER = (1.0, 1.7, 3.0)
 """Radii that are tried, in least ones: larger ones are quicker."""
+ALL_SIDES = math.pi / 2 - 0.01
+"""Who crabs so far to both sides, forwards and backwards, needs no zigzags, rad."""
 MOST_PATTERNS = 10
 """So many patterns between two poses are tried."""
 
 
 class Connector:
-    """Finds moves between poses for one vehicle."""
+    """Finds moves between poses for one vehicle.
 
-    def __init__(self, permits: Permits) -> None:
+    Parameters
+    ----------
+    permits : Permits
+    keeps_heading : bool
+        Whether to look only for moves without a turn.
+    """
+
+    def __init__(self, permits: Permits, *, keeps_heading: bool = False) -> None:
         self.permits = permits
         space = permits.space
-        self.is_translating = space.is_translating
+        self.is_translating = space.is_translating or keeps_heading
         self.line = space.line_beta
         self.spins = not self.is_translating and all(
             permits.drives(Move.straight((0, 0, 0), (0, 0, turn))) for turn in (1, -1)
         )
-        self.frames = () if self.is_translating else tuple(self._frames())
+        self.frames = () if space.is_translating else tuple(self._frames())
+        self._whirl = math.inf
+        if not self.frames and self.line is None and not self.is_translating:
+            self._whirl = self._least_whirl()
 
     @property
     def is_stuck(self) -> bool:
@@ -106,7 +119,9 @@ class Connector:
         ----------
         a, b : (float, float, float), m, m, rad
         """
-        chains = (self._permitted(moves) for moves in self._many(a, b))
+        chains = [self._permitted(moves) for moves in self._many(a, b)]
+        if self.frames and not self.spins:  # none of the many patterns may be as quick
+            chains.append(self.quick(a, b))
         timed = [(chain_time(self.permits, c), c) for c in chains if c is not None]
         return sorted(timed, key=lambda pair: pair[0])
 
@@ -120,11 +135,13 @@ class Connector:
         return tuple(legs)
 
     def _few(self, a: Pose, b: Pose) -> Iterator[tuple[Move, ...]]:
+        if self.is_translating:
+            yield from self._without_turn(a, b)
+            return
         if self.line is None:
             yield _kept(Move.straight(a, b))
-            if self.is_translating:
-                return
             yield _kept(Move.arc(a, b))
+            yield from self._whirls(a, b)
         if self.spins:
             if self.line is None:
                 yield _turn_first(a, b)
@@ -135,11 +152,13 @@ class Connector:
                 yield pattern.moves(a)
 
     def _many(self, a: Pose, b: Pose) -> Iterator[tuple[Move, ...]]:
+        if self.is_translating:
+            yield from self._without_turn(a, b)
+            return
         turn = math.remainder(b[2] - a[2], 2 * math.pi)
         if self.line is None:
             yield _kept(Move.straight(a, b))
-            if self.is_translating:
-                return
+            yield from self._whirls(a, b)
             other = turn - math.copysign(2 * math.pi, turn)
             yield _kept(Move.straight(a, b, turn=other))
         yield _kept(Move.arc(a, b))
@@ -157,6 +176,44 @@ class Connector:
         ]
         for pattern in self._patterns(a, b, frames):
             yield pattern.moves(a)
+
+    def _without_turn(self, a: Pose, b: Pose) -> Iterator[tuple[Move, ...]]:
+        """Yield the straight move and, for who cannot crab to all sides, zigzags."""
+        b = (b[0], b[1], a[2])
+        yield _kept(Move.straight(a, b))
+        if self.line is None and 0 < self._crab_range < ALL_SIDES:
+            speed = self._speed
+            zigzags = zigzags_between(a, b, self._crab_range, 0.0, speed)
+            for zigzag in sorted(zigzags, key=lambda pattern: pattern.price):
+                yield zigzag.moves(a)
+
+    def _whirls(self, a: Pose, b: Pose) -> Iterator[tuple[Move, ...]]:
+        """Yield straight moves with so many full turns that all of it is permitted."""
+        if math.isinf(self._whirl):
+            return
+        turn = math.remainder(b[2] - a[2], 2 * math.pi)
+        least = self._whirl * math.dist(a[:2], b[:2])
+        turns = [
+            turn + side * 2 * math.pi * (more + max(math.ceil(short), 0))
+            for side in (1, -1)
+            for short in [(least - side * turn) / (2 * math.pi)]
+            for more in (0, 1)
+        ]
+        for whole in sorted(turns, key=abs):
+            yield _kept(Move.straight(a, b, turn=whole))
+
+    def _least_whirl(self) -> float:
+        """Return the least curvature at which all β are permitted, 1/m; else inf."""
+        for k in np.linspace(0.0, 2.0, SCAN + 1).tolist():
+            if any(
+                self.permits.v_max(side * k, 0.0, 2 * math.pi, reverse=reverse) > 0
+                for side in (1, -1)
+                for reverse in (False, True)
+            ):
+                return float(
+                    self.permits.kappa_g * (k if k < 1 else 1 / max(2 - k, 1e-9))
+                )
+        return math.inf
 
     def _patterns(
         self, a: Pose, b: Pose, frames: Sequence[Frame]

@@ -39,6 +39,7 @@ def drive(
     kappa_dot: Array,
     beta_dot: Array,
     is_line: bool,
+    is_straight: bool,
     kappa_g: float,
     fine: float,
     start: Array,
@@ -58,6 +59,8 @@ def drive(
         Change rates per level of speed.
     is_line : bool
         Whether β is constant.
+    is_straight : bool
+        Whether κ_n is 0 at all times.
     kappa_g : float, 1/m
     fine : float, 1 and rad
         As of `arcs_of_step`.
@@ -79,6 +82,7 @@ def drive(
             kappa_dot,
             beta_dot,
             is_line,
+            is_straight,
             kappa_g,
             fine,
             controls[j],
@@ -93,6 +97,7 @@ def _drive_one(
     kappa_dot: Array,
     beta_dot: Array,
     is_line: bool,
+    is_straight: bool,
     kappa_g: float,
     fine: float,
     control: Array,
@@ -112,11 +117,13 @@ def _drive_one(
         along = (i + 0.5) / STEPS
         duration *= 4 * along * (1 - along)
         change = control[0] * kappa_dot[level, row, column] * duration
-        kappa_1 = min(2.0, max(-2.0, kappa + change))
+        kappa_1 = kappa if is_straight else min(2.0, max(-2.0, kappa + change))
         beta_1 = beta
         if not is_line:
             beta_1 += control[1] * beta_dot[level, row, column] * duration
-        if not _is_step_permitted(table, is_line, kappa, kappa_1, beta, beta_1):
+        if not _is_step_permitted(
+            table, is_line, is_straight, kappa, kappa_1, beta, beta_1
+        ):
             return -1.0, float(i)
         states[i + 1, 3], states[i + 1, 4] = kappa_1, beta_1
         _move(states, i, sign * step, kappa_g, fine)
@@ -125,10 +132,13 @@ def _drive_one(
 
 @njit(cache=True)
 def _is_step_permitted(
-    table: Array, is_line: bool, kappa_0: float, kappa_1: float, beta_0: float,
-    beta_1: float,
+    table: Array, is_line: bool, is_straight: bool, kappa_0: float, kappa_1: float,
+    beta_0: float, beta_1: float,
 ) -> bool:  # fmt: skip
     """Return whether the configurations around a step are permitted, on both edges."""
+    if is_straight:
+        first, turn = min(beta_0, beta_1), abs(beta_1 - beta_0)
+        return bool(is_piece_permitted(table, 0.0, first - MARGIN, turn + 2 * MARGIN))
     low, high = min(kappa_0, kappa_1) - MARGIN, max(kappa_0, kappa_1) + MARGIN
     low, high = max(low, -2.0), min(high, 2.0)
     first, turn = min(beta_0, beta_1), abs(beta_1 - beta_0)

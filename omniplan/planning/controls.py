@@ -20,6 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -36,7 +37,7 @@ from omniplan.planning.route import Route
 from omniplan.planning.task import Pose, Task
 from omniplan.sampling.intervals import PermittedIntervals
 
-__all__ = ["search"]
+__all__ = ["make_ready", "search"]
 
 FloatArray = npt.NDArray[np.float64]
 State: TypeAlias = tuple[float, float, float, float, float]
@@ -116,6 +117,21 @@ def search(task: Task, connector: Connector) -> tuple[Route, float] | None:
     return tree.route(best), tree.ways[0].at
 
 
+def make_ready(task: Task, connector: Connector) -> None:
+    """Compile the kernels and make the vehicle's tables.
+
+    Parameters
+    ----------
+    task : Task
+        Any, of the vehicle.
+    connector : Connector
+    """
+    tree = _Tree(task, connector)
+    for state in tree.begin():
+        tree.drive(state, 0.5, 0.0)
+        tree.drive(state, 0.5, 1.0)
+
+
 class _Tree:
     """What has been driven so far."""
 
@@ -139,7 +155,7 @@ class _Tree:
     def is_over(self) -> bool:
         """Whether to end."""
         task = self.task
-        if task.is_over() or len(self.ways) >= ENOUGH:
+        if task.budget.is_over or len(self.ways) >= ENOUGH:
             return True
         first = self._first_after
         return first is not None and task.budget.asked > PATIENCE * first
@@ -168,6 +184,7 @@ class _Tree:
             self._space.tables.load,
             *self._rates,
             self._space.line_beta is not None,
+            self._space.is_translating,
             self._space.kappa_g,
             _fineness(self._space),
             np.array(state),
@@ -394,6 +411,9 @@ def _controls(random: np.random.Generator, task: Task) -> FloatArray:
     if task.space.line_beta is not None:
         out[:, 0] = size * side
         out[:, 1] = 0.0
+    if task.space.is_translating:
+        out[:, 0] = 0.0
+        out[:, 1] = size * side
     level = random.integers(1, len(LEVELS) + 1, POOL)
     out[:, 2] = level * np.where(random.random(POOL) < AHEAD, 1.0, -1.0)
     longest = max(2 * SHORTEST, LONGEST * math.hypot(x1 - x0, y1 - y0))
@@ -401,6 +421,7 @@ def _controls(random: np.random.Generator, task: Task) -> FloatArray:
     return out
 
 
+@lru_cache(maxsize=16)
 def _rate_tables(space: PermissibleSpace) -> tuple[FloatArray, FloatArray]:
     """Return change rates of κ_n and β per level of speed and cell."""
     rows, columns = space.rates.v_s_dot.shape

@@ -52,7 +52,7 @@ def shortened(
     random : numpy.random.Generator
     """
     chain, total, stale = found.chain, found.duration, 0
-    while stale < STALE and len(chain) > 1 and not task.is_over():
+    while stale < STALE and len(chain) > 1 and not task.budget.is_over:
         stale += 1
         change = _cut if random.random() < CUTS else _shift
         for _, whole, new in itertools.islice(
@@ -152,4 +152,4 @@ def _part(connector: Connector, leg: Leg, u: float, v: float) -> Chain | None:
 
 def moves_of(chain: Chain) -> list[Move]:
     """Return the moves of a chain."""
-    return [leg[0].move for leg in itertools.chain(chain)]
+    return [leg[0].move for leg in chain]

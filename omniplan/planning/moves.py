@@ -24,12 +24,15 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace.angles import wrap
+from omniplan.samples import HEADING_LENGTH
 
-__all__ = ["Move"]
+__all__ = ["Move", "goes_on"]
 
 FloatArray = npt.NDArray[np.float64]
 Shape: TypeAlias = Literal["straight", "arc"]
 
+SAME = 1e-6
+"""Twists whose directions differ by less go on in each other."""
 NO_WAY = 1e-12
 """Below this length, m, a move is a turn on the spot: its β has no meaning and is 0."""
 
@@ -217,6 +220,23 @@ class Move:
         """Return the same way driven from goal to start."""
         beta = float(wrap(self.beta_1 + np.pi)) if self.length > NO_WAY else 0.0
         return Move(self.shape, self.goal, self.start, self.length, -self.turn, beta)
+
+
+def goes_on(before: Move, after: Move) -> bool:
+    """Return whether one move leaves in the twist in which the other one arrives.
+
+    Parameters
+    ----------
+    before, after : Move
+        Each with a length or a turn.
+    """
+    ends = []
+    for move, beta in ((before, before.beta_1), (after, after.beta_0)):
+        turn = HEADING_LENGTH * move.turn
+        size = math.hypot(move.length, turn)
+        length = move.length / size
+        ends.append((length * math.cos(beta), length * math.sin(beta), turn / size))
+    return math.dist(*ends) < SAME
 
 
 def _apart(

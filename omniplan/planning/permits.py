@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from configspace import PermissibleSpace, Vehicle
 from configspace.vehicle import SteerableWheel
-from omniplan.planning.moves import NO_WAY, Move
+from omniplan.planning.moves import NO_WAY, Move, goes_on
 from omniplan.sampling.intervals import PermittedIntervals
 
 __all__ = ["Configuration", "Drive", "Permits"]
@@ -32,8 +32,6 @@ EDGE = 1e-5
 STOP = 3e-4
 """Wheels keep so far from their stops, rad: the splines of a trajectory leave its moves
 by rounding, and a wheel at its stop could not be proved to be within it."""
-SAME = 1e-6
-"""Twists whose directions differ by less go on in each other."""
 STEER_FREE = math.radians(0.01)
 """Wheels that turn by less than this keep their configuration, rad."""
 
@@ -144,13 +142,7 @@ class Permits:
 
     def is_steady(self, before: Drive, after: Drive) -> bool:
         """Return whether one move goes on in the same twist as the one before."""
-        if before.sign != after.sign:
-            return False
-        (k0, b0), (k1, b1) = before.goal, after.start
-        if abs(k1 - k0) > SAME:
-            return False
-        apart = math.remainder(b1 - b0, 2 * math.pi)
-        return _components(k0)[0] * abs(apart) < SAME
+        return before.sign == after.sign and goes_on(before.move, after.move)
 
 
 def _components(kappa_n: float) -> tuple[float, float]:

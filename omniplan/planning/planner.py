@@ -19,12 +19,14 @@ import numpy.typing as npt
 from configspace import PermissibleSpace
 from omniplan.planning.blend import rounded_off
 from omniplan.planning.connect import Connector
+from omniplan.planning.easing import eased_off
 from omniplan.planning.finish import finished, steering_wait
 from omniplan.planning.improve import GAIN, moves_of, shortened
 from omniplan.planning.request import Request, checked_request, refusal
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.route import Route
 from omniplan.planning.search import OPTIMISING, Found, direct, search
+from omniplan.planning.start_up import make_ready
 from omniplan.planning.task import Task
 from omniplan.trajectory import Trajectory
 from omniplan.validation import validate
@@ -38,7 +40,10 @@ RESTARTS = 3
 PATIENCE = 2
 """A search for a quicker way ends after so many times the motions asked before."""
 MOST_FINISHED = 3
-"""So many ways are timed and proved, the quickest first, until one is accepted."""
+"""Of so many ways the corners are rounded, and all are timed and proved, those that are
+hoped to be the quickest first, until one is accepted."""
+MOST_EASED = 8
+"""Of so many ways the arcs are eased."""
 
 Statistics = dict[str, float | int | str]
 
@@ -56,6 +61,7 @@ def plan(
     seed: int = 1,
     iterations: int | None = None,
     method: Literal["geometric", "control"] = "geometric",
+    heading: Literal["free", "keep"] = "free",
 ) -> Plan:
     """Return the quickest trajectory found from pose to pose, or why there is none.
 
@@ -84,14 +90,18 @@ def plan(
         ``RRT``, ``KPIECE1``, ``BKPIECE1``, ``LBKPIECE1``; ``RRTstar``,
         ``InformedRRTstar``, ``BITstar`` and ``FMT`` minimise the travel time.
     time : float, s, > 0
-        For the search; timing and proof come on top. It ends earlier once several
-        searches in a row have found nothing quicker.
+        For the search; timing and proof come on top, and so does what is done once: a
+        first plan compiles kernels, the first one of a vehicle makes its tables. It
+        ends earlier once several searches in a row have found nothing quicker.
     seed : int, [1, 2**31)
     iterations : int, > 0, optional
         So many motions are checked for collisions at most: with enough time the same
         seed gives the same plan.
     method : {"geometric", "control"}
         Chains of moves, or motions with the rates of (κ_n, β, v_s) as controls.
+    heading : {"free", "keep"}
+        With ``keep`` the vehicle only translates, in any direction it can: its load
+        keeps its heading all along. Whether it can at all, the status says.
 
     Returns
     -------
@@ -130,12 +140,15 @@ def plan(
         seed=seed,
         iterations=iterations,
         method=method,
+        heading=heading,
     )
     no = refusal(request)
     if no is not None:
         return no
     if request.is_at_goal:
         return _standing(request)
+    make_ready(request.connector, method)
+    request.task.budget.start()
     if method == "control":
         return _controlled(request)
     return _geometric(request)
@@ -160,9 +173,12 @@ def _geometric(request: Request) -> Plan:
 
 def _routes(task: Task, connector: Connector, ways: list[Found]) -> Iterator[Route]:
     """Yield routes to try, the one that is hoped to be quickest first."""
-    routes = [Route.from_moves(moves_of(way.chain)) for way in ways[:MOST_FINISHED]]
+    chains = [moves_of(way.chain) for way in ways[:MOST_EASED]]
+    routes = [Route.from_moves(moves) for moves in chains[:MOST_FINISHED]]
     rounded = [rounded_off(task, connector.permits, route) for route in routes]
-    for route, _ in sorted(rounded, key=operator.itemgetter(1)):
+    eased = [eased_off(task, connector, moves) for moves in chains]
+    good = [*rounded, *(pair for pair in eased if pair is not None)]
+    for route, _ in sorted(good, key=operator.itemgetter(1))[: 2 * MOST_FINISHED]:
         yield route
     for (route, _), plain in zip(rounded, routes, strict=True):
         if len(plain.stops) > len(route.stops):
@@ -213,7 +229,7 @@ def _is_enough(task: Task, ways: list[Found]) -> bool:
     task.budget.has_way = bool(ways)
     if task.budget.is_enclosed:
         return True
-    return task.is_over() or any(len(way.chain) == 1 for way in ways)
+    return task.budget.is_over or any(len(way.chain) == 1 for way in ways)
 
 
 def _controlled(request: Request) -> Plan:

@@ -3,46 +3,31 @@
 from __future__ import annotations
 
 import math
-import operator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
 
-import numpy as np
 import numpy.typing as npt
 
 from configspace import InvalidInput, PermissibleSpace, Problem, Vehicle
+from configspace.kernels import BLOCKED
 from configspace.limits import Reason
-from configspace.omni_curve import nominal_curvature
 from configspace.space import require_space
+from omniplan.planning import arguments, hall
 from omniplan.planning.connect import Connector
 from omniplan.planning.finish import Ends
 from omniplan.planning.moves import Move
 from omniplan.planning.permits import Configuration, Permits
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.search import PLANNERS
-from omniplan.planning.task import Bounds, Budget, Checker, Pose, Task
-from omniplan.samples import MAX_VALUE
+from omniplan.planning.task import Budget, Checker, Pose, Task
 
 __all__ = ["Request", "checked_request", "refusal"]
 
 METHODS = ("geometric", "control")
+HEADINGS = ("free", "keep")
 SAME = 5e-6
 """Start and goal that differ by less, m and rad, are one."""
 LARGEST_SEED = 2**31 - 1
-ROOM = 5.0
-"""Where no bounds are given, poses are looked for within this distance at least, m."""
-RADII = 4.0
-"""... and within so many least radii ..."""
-SHARE = 0.5
-"""... and within this share of the size of the hall."""
-SPARE = 1e-3
-"""Moves keep so much more distance than asked for, where start and goal allow it, m:
-the splines of a trajectory leave them by less."""
-
-
-LEAST_SPARE = 1e-5
-"""Less than this is not worth a second checker, m."""
 VEHICLES = 16
 """For so many vehicles the tables of the search are kept."""
 
@@ -86,32 +71,39 @@ def checked_request(
     seed: int,
     iterations: int | None,
     method: str,
+    heading: str,
 ) -> Request:
     """Return a request, or raise InvalidInput saying what makes no sense.
 
     Parameters
     ----------
     start, goal, space, obstacles, bounds, clearance, planner, time, seed, iterations, \
-method
+method, heading
         As of `omniplan.plan`.
     """
     vehicle = _vehicle(space)
-    a, from_ = _end("start", start)
-    b, to = _end("goal", goal)
-    _require_one_of("planner", planner, PLANNERS)
-    _require_one_of("method", method, METHODS)
-    seconds = _positive("time", time, "s")
-    number = _whole("seed", seed, 1, LARGEST_SEED)
-    motions = None if iterations is None else _whole("iterations", iterations, 1, None)
-    connector = _connector(space)
-    strict, checker = _checkers(space, obstacles, bounds, clearance, (a, b))
+    a, from_ = arguments.end("start", start)
+    b, to = arguments.end("goal", goal)
+    arguments.one_of("planner", planner, PLANNERS)
+    arguments.one_of("method", method, METHODS)
+    keeps_heading = arguments.one_of("heading", heading, HEADINGS) == "keep"
+    if keeps_heading and method == "control":
+        allowed = '"free" with method="control"'
+        raise InvalidInput(Problem("heading", "'keep'", allowed))
+    seconds = arguments.positive("time", time, "s")
+    number = arguments.whole("seed", seed, 1, LARGEST_SEED)
+    motions = None
+    if iterations is not None:
+        motions = arguments.whole("iterations", iterations, 1, None)
+    connector = _connector(space, keeps_heading)
+    strict, checker = hall.checkers(space, obstacles, bounds, clearance, (a, b))
     task = Task(
         a,
         b,
         space,
         vehicle,
         checker,
-        _area(strict, connector, (a, b)),
+        hall.area_of(strict, connector, (a, b)),
         planner,
         number,
         Budget(seconds, motions),
@@ -126,10 +118,15 @@ def refusal(request: Request) -> Plan | None:
     ----------
     request : Request
     """
-    task, ends = request.task, request.ends
     if request.connector.is_stuck:
         message = "no configuration of the wheels is permitted: it cannot move"
-        return _no(request, PlanStatus.UNREACHABLE, message, task.start)
+        return _no(request, PlanStatus.UNREACHABLE, message, request.task.start)
+    return _blocked(request) or _forbidden(request) or _turned(request)
+
+
+def _blocked(request: Request) -> Plan | None:
+    """Return the answer if the vehicle cannot stand at the start or the goal."""
+    task = request.task
     for status, pose, name in (
         (PlanStatus.START_BLOCKED, task.start, "start"),
         (PlanStatus.GOAL_BLOCKED, task.goal, "goal"),
@@ -139,23 +136,63 @@ def refusal(request: Request) -> Plan | None:
         hit = request.strict.first_hit(Move.straight(pose, pose))
         what = "is not free" if hit is None else str(hit.message)
         return _no(request, status, f"at the {name} it {what}", pose)
+    return None
+
+
+def _forbidden(request: Request) -> Plan | None:
+    """Return the answer if a configuration that is asked for is not permitted."""
+    task, ends = request.task, request.ends
     for status, at, pose, name in (
         (PlanStatus.START_NOT_PERMITTED, ends.start, task.start, "start"),
         (PlanStatus.GOAL_NOT_PERMITTED, ends.goal, task.goal, "goal"),
     ):
-        if at is not None:
-            why = _not_permitted(task, at)
-            if why:
-                text = f"the configuration at the {name}, {why}"
-                return _no(request, status, text, pose)
+        why = "" if at is None else _not_permitted(task, at)
+        if why:
+            text = f"the configuration at the {name}, {why}"
+            return _no(request, status, text, pose)
+    return None
+
+
+def _turned(request: Request) -> Plan | None:
+    """Return the answer if the heading is kept and the goal asks for more than that."""
+    task, space = request.task, request.task.space
+    if not request.connector.is_translating or request.is_at_goal:
+        return None
+    why = "its wheels always point alike, so it keeps its heading"
+    if not space.is_translating:
+        why = "it shall keep its heading"
     turn = math.remainder(task.goal[2] - task.start[2], 2 * math.pi)
-    if task.space.is_translating and abs(turn) > SAME:
-        message = (
-            "its wheels always point alike, so it keeps its heading: "
-            f"{_degrees(task.start[2])} at the start, {_degrees(task.goal[2])} at the "
-            "goal"
+    if abs(turn) > SAME:
+        ends = f"{_degrees(task.start[2])} at the start, {_degrees(task.goal[2])}"
+        text = f"{why}: {ends} at the goal"
+        return _no(request, PlanStatus.UNREACHABLE, text, task.goal)
+    state = space.tables.state  # the rows on both sides of κ_n = 0
+    if (state[(len(state) - 1) // 2 : len(state) // 2 + 1] == BLOCKED).all():
+        text = f"{why}, but nothing is permitted at κ_n = 0: it moves only as it turns"
+        return _no(request, PlanStatus.UNREACHABLE, text, task.start)
+    if space.line_beta is not None:
+        return _off_the_line(request, why, space.line_beta)
+    return None
+
+
+def _off_the_line(request: Request, why: str, line: float) -> Plan | None:
+    """Return the answer if a vehicle bound to a line cannot drive straight there."""
+    task = request.task
+    dx, dy = (b - a for a, b in zip(task.start[:2], task.goal[:2], strict=True))
+    off = math.remainder(math.atan2(dy, dx) - task.start[2] - line, math.pi)
+    if math.hypot(dx, dy) * abs(math.sin(off)) > SAME:
+        at, on = math.remainder(off + line, 2 * math.pi), _degrees(line)
+        text = (
+            f"{why}, and its fixed axle lets it drive only along β = {on} then, "
+            f"but the goal lies at β = {_degrees(at)}"
         )
-        return _no(request, PlanStatus.UNREACHABLE, message, task.goal)
+        return _no(request, PlanStatus.UNREACHABLE, text, task.goal)
+    hit = None
+    if request.strict is not None:
+        hit = request.strict.first_hit(Move.straight(task.start, task.goal))
+    if hit is not None:
+        text = f"{why}, so there is the straight way only, on which it {hit.message}"
+        return _no(request, PlanStatus.UNREACHABLE, text, hit.pose)
     return None
 
 
@@ -191,8 +228,13 @@ def _degrees(angle: float) -> str:
 
 
 @lru_cache(maxsize=VEHICLES)
-def _connector(space: PermissibleSpace) -> Connector:
-    return Connector(Permits(space, _vehicle(space)))
+def _permits(space: PermissibleSpace) -> Permits:
+    return Permits(space, _vehicle(space))
+
+
+@lru_cache(maxsize=2 * VEHICLES)
+def _connector(space: PermissibleSpace, keeps_heading: bool) -> Connector:
+    return Connector(_permits(space), keeps_heading=keeps_heading)
 
 
 def _vehicle(space: PermissibleSpace) -> Vehicle:
@@ -202,101 +244,3 @@ def _vehicle(space: PermissibleSpace) -> Vehicle:
         allowed = "planning needs the vehicle: a data sheet does not hold all its rates"
         raise InvalidInput(Problem("space", given, allowed))
     return space.vehicle
-
-
-def _end(name: str, value: npt.ArrayLike) -> tuple[Pose, Configuration | None]:
-    """Return pose and configuration of the start or the goal."""
-    allowed = "(x, y, θ) or (x, y, θ, κ_n, β): finite numbers, m, m, rad, 1, rad"
-    try:
-        given = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed)) from error
-    if given.shape not in ((3,), (5,)) or not np.isfinite(given).all():
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed))
-    if np.abs(given).max() > MAX_VALUE:
-        allowed = f"numbers of at most {MAX_VALUE:g}"
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed))
-    x, y, theta, *rest = given.tolist()
-    if not rest:
-        return (x, y, theta), None
-    try:
-        nominal_curvature(rest[0])
-    except InvalidInput as error:
-        raise InvalidInput(error.problems, name) from error
-    return (x, y, theta), (rest[0], math.remainder(rest[1], 2 * math.pi))
-
-
-def _require_one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        choice = f"one of {', '.join(allowed)}"
-        raise InvalidInput(Problem(name, repr(value)[:60], choice))
-
-
-def _positive(name: str, value: object, unit: str) -> float:
-    is_number = isinstance(value, int | float | np.number) and value is not True
-    if not is_number or not 0 < cast(float, value) < math.inf:
-        allowed = f"a positive, finite number of {unit}"
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed))
-    return float(cast(float, value))
-
-
-def _whole(name: str, value: object, least: int, largest: int | None) -> int:
-    allowed = f"a whole number, at least {least}"
-    if largest is not None:
-        allowed += f", at most {largest}"
-    try:
-        number = operator.index(cast(int, value))
-    except TypeError as error:
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed)) from error
-    if isinstance(value, bool) or number < least or number > (largest or number):
-        raise InvalidInput(Problem(name, repr(value)[:60], allowed))
-    return number
-
-
-def _checkers(
-    space: PermissibleSpace,
-    obstacles: object,
-    bounds: npt.ArrayLike | None,
-    clearance: float,
-    ends: tuple[Pose, Pose],
-) -> tuple[Checker | None, Checker | None]:
-    """Return the checker that was asked for, and one that keeps a little more off."""
-    from omniplan.obstacles import CollisionChecker, Obstacles
-
-    if isinstance(obstacles, CollisionChecker):
-        if bounds is not None or clearance != 0.0:
-            allowed = "a CollisionChecker brings its own bounds and clearance"
-            raise InvalidInput(Problem("bounds, clearance", "given as well", allowed))
-        return obstacles, obstacles
-    if obstacles is None and bounds is None:
-        return None, None
-    if obstacles is not None and not isinstance(obstacles, Obstacles):
-        allowed = "Obstacles, or a CollisionChecker"
-        raise InvalidInput(Problem("obstacles", type(obstacles).__name__, allowed))
-    area = None if bounds is None else np.asarray(bounds).ravel().tolist()
-    strict = CollisionChecker(space, obstacles, clearance, area)
-    room = min(strict.distance(pose) for pose in ends) - clearance
-    spare = min(SPARE, room / 2)
-    if spare < LEAST_SPARE:
-        return strict, strict
-    return strict, CollisionChecker(space, obstacles, clearance + spare, area)
-
-
-def _area(
-    checker: Checker | None, connector: Connector, ends: tuple[Pose, Pose]
-) -> Bounds:
-    """Return where K is looked for."""
-    x = [pose[0] for pose in ends]
-    y = [pose[1] for pose in ends]
-    bounds = getattr(checker, "bounds", None)
-    if bounds is not None:
-        return (
-            min(bounds[0], *x), min(bounds[1], *y),
-            max(bounds[2], *x), max(bounds[3], *y),
-        )  # fmt: skip
-    hall = getattr(getattr(checker, "obstacles", None), "bounds", None)
-    if hall is not None:
-        x, y = [*x, hall[0], hall[2]], [*y, hall[1], hall[3]]
-    size = max(max(x) - min(x), max(y) - min(y))
-    room = max(ROOM, SHARE * size, RADII * (connector.radius or 0.0))
-    return min(x) - room, min(y) - room, max(x) + room, max(y) + room

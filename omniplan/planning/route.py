@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from omniplan.path import Path
-from omniplan.planning.moves import Move
+from omniplan.planning.moves import Move, goes_on
 from omniplan.samples import HEADING_LENGTH, locked
 
-__all__ = ["Route", "goes_on"]
+__all__ = ["Route"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,8 +27,6 @@ LEAST = 4
 """Least number of steps of a move: a spline through fewer is not free to bend."""
 CLOSEST = 1e-5
 """Poses are no closer than this, m: a path must move from pose to pose."""
-SAME = 1e-6
-"""Twists whose directions differ by less go on in each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +73,6 @@ class Route:
         return Path.from_poses(
             self.poses, name=name, reference_point=reference_point, stops=self.stops
         )
-
-
-def goes_on(before: Move, after: Move) -> bool:
-    """Return whether one move leaves in the twist in which the other one arrives."""
-    ends = []
-    for move, beta in ((before, before.beta_1), (after, after.beta_0)):
-        turn = HEADING_LENGTH * move.turn
-        size = math.hypot(move.length, turn)
-        length = move.length / size
-        ends.append((length * math.cos(beta), length * math.sin(beta), turn / size))
-    return math.dist(*ends) < SAME
 
 
 def _steps(move: Move) -> int:

@@ -47,7 +47,7 @@ def direct(task: Task, connector: Connector) -> Found | None:
     connector : Connector
     """
     for duration, chain in connector.thorough(task.start, task.goal)[:DIRECT]:
-        if task.is_over():
+        if task.budget.is_over:
             return None
         if task.are_free(leg[0].move for leg in chain):
             return Found(chain, duration, task.budget.elapsed)
@@ -129,7 +129,7 @@ class _Run:
         def is_over() -> bool:
             if self.first_at is None and problem.hasExactSolution():
                 self.first_at = task.budget.elapsed
-            if task.is_over() or task.budget.asked >= most:
+            if task.budget.is_over or task.budget.asked >= most:
                 return True
             return self.first_at is None and task.is_known_enclosed()
 

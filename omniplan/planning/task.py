@@ -68,6 +68,10 @@ class Budget:
     """Whether it is proved that there is no way; None: not looked at yet."""
     begun: float = field(default_factory=time.perf_counter)
 
+    def start(self) -> None:
+        """Let the clock start now."""
+        self.begun = time.perf_counter()
+
     @property
     def elapsed(self) -> float:
         """Time since the beginning, s."""
@@ -105,10 +109,6 @@ class Task:
     planner: str
     seed: int
     budget: Budget
-
-    def is_over(self) -> bool:
-        """Return whether the search must end."""
-        return self.budget.is_over
 
     def is_known_enclosed(self) -> bool:
         """Return whether it is proved that there is no way.

@@ -118,9 +118,7 @@ def plot_way(drive: Drive, report: Report, trajectory: Trajectory) -> Figure:
     """
     figure, marks = new_figure(9.0, 6.2), marks_of(report)
     keys = draw_way(figure.add_subplot(), drive, trajectory.reference_point, marks)
-    figure.suptitle(_headline(report), fontsize="medium")
-    legend_below(figure, keys, marks)
-    return figure
+    return _framed(figure, report, keys)
 
 
 def plot_on_space(drive: Drive, report: Report) -> Figure:
@@ -137,9 +135,7 @@ def plot_on_space(drive: Drive, report: Report) -> Figure:
     """
     figure, marks = new_figure(8.6, 6.4), marks_of(report)
     keys = draw_on_space(figure.add_subplot(), drive, marks)
-    figure.suptitle(_headline(report), fontsize="medium")
-    legend_below(figure, keys, marks)
-    return figure
+    return _framed(figure, report, keys)
 
 
 def plot_times(drive: Drive, report: Report) -> Figure:
@@ -158,9 +154,14 @@ def plot_times(drive: Drive, report: Report) -> Figure:
     figure = new_figure(9.6, 1.2 + 1.75 * n_panels + 0.2 * len(marks))
     panels = list(figure.subplots(n_panels, 1, sharex=True))
     draw_times(panels, drive, report, marks)
-    figure.suptitle(_headline(report), fontsize="medium")
     figure.align_ylabels(panels)
-    legend_below(figure, [], marks)
+    return _framed(figure, report, [])
+
+
+def _framed(figure: Figure, report: Report, keys: list[Artist]) -> Figure:
+    """Return a figure with the verdict above it, keys and violations below."""
+    figure.suptitle(_headline(report), fontsize="medium")
+    legend_below(figure, keys, marks_of(report))
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from configspace.plot_style import new_figure
 from omniplan.motion import stops_of
@@ -61,7 +63,7 @@ def panels(
     width: float = 4.2,
     below: float = 0.35,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel per plan, and the panels.
+    """Return a figure with one panel per plan in one scale, and the panels.
 
     Parameters
     ----------
@@ -89,7 +91,27 @@ def panels(
         each.set_title(
             plain(solution.title[:1].upper() + solution.title[1:]), fontsize="medium"
         )
+    _draw_scale(axes[0], x1 - x0)
     return figure, axes
+
+
+def _draw_scale(axes: Axes, width: float) -> None:
+    """Draw a bar of a round length, about a fifth of the width, m."""
+    step = 10.0 ** math.floor(math.log10(width / 5))
+    length = max(n * step for n in (1, 2, 5) if n * step <= width / 5)
+    bar = AnchoredSizeBar(
+        axes.transData,
+        length,
+        f"{length:g} m",
+        "lower right",
+        pad=0.3,
+        sep=3,
+        size_vertical=0.004 * width,
+        prop={"size": "small"},
+    )
+    bar.patch.set(alpha=0.8, ec="none")
+    bar.set_zorder(8)
+    axes.add_artist(bar)
 
 
 def draw_scene(axes: Axes, solution: Solution) -> None:

@@ -111,7 +111,8 @@ def verdict_text(report: Report | Unfit | Undrivable) -> str:
         return _limit_text(report.fault.limit, report.fault.wheel)
     if report.valid:
         fastest = report.fastest_duration
-        return f"{report.duration if fastest is None else fastest:.3g} s"
+        duration = report.duration if fastest is None else fastest
+        return f"{duration:.{2 if duration < 9.995 else 1}f} s"
     first = report.headline
     if first is None:
         return "refused"

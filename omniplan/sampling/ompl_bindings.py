@@ -22,6 +22,7 @@ from configspace import PermissibleSpace
 from configspace.errors import InvalidInput, Problem
 from configspace.omni_curve import finite
 from configspace.space import require_space
+from omniplan.obstacles import CollisionChecker
 from omniplan.planning.moves import Move
 from omniplan.sampling.curves import along_curves
 from omniplan.sampling.intervals import PermittedIntervals
@@ -163,6 +164,8 @@ def validity_checker(
             answer: bool = is_within(state)
             return answer
 
+    elif isinstance(checker, CollisionChecker):
+        is_valid = _valid_on_open_floor(is_within, checker)
     else:
         is_free = checker.is_free
 
@@ -172,6 +175,26 @@ def validity_checker(
     kind = _with_method(StateValidityChecker, "isValid", is_valid)
     made: StateValidityChecker = kind(si, checker)
     return made
+
+
+def _valid_on_open_floor(
+    is_within: Callable[[Any], bool], checker: CollisionChecker
+) -> Callable[[Any, Any], bool]:
+    """Return the method `isValid` that decides most states by one look into a set."""
+    is_free, floor = checker.is_free, math.floor
+    cells, scale = checker.open_floor
+
+    def is_valid(_: Any, state: Any) -> bool:
+        if not is_within(state):
+            return False
+        try:
+            if (floor(state.getX() * scale), floor(state.getY() * scale)) in cells:
+                return True
+        except (ValueError, OverflowError):  # not finite: the checker says it better
+            pass
+        return is_free(_pose(state))
+
+    return is_valid
 
 
 def motion_validator(
@@ -412,11 +435,20 @@ def _pose(state: Any) -> Pose:
 
 def _along_lines(checker: Collisions) -> Check:
     """Return the check of straight motions for collisions."""
+    is_clear: Callable[[float, float, float, float], bool] = _never_clear
+    if isinstance(checker, CollisionChecker):
+        is_clear = checker.is_line_clear
 
     def check(first: Any, second: Any) -> bool:
+        if is_clear(first.getX(), first.getY(), second.getX(), second.getY()):
+            return True
         return bool(checker.is_motion_free(Move.straight(_pose(first), _pose(second))))
 
     return check
+
+
+def _never_clear(_x0: float, _y0: float, _x1: float, _y1: float) -> bool:
+    return False
 
 
 def _radius_of(state_space: Any) -> float:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from types import MappingProxyType
+from typing import Literal
 
 from configspace import InvalidInput, PermissibleSpace, Problem, build_space
 from configspace.vehicle_io import parse_vehicle
@@ -44,6 +45,8 @@ class Scenario:
     seed: int = 1
     iterations: int = 4000
     """Motions that are checked in the search of each plan at most."""
+    heading: Literal["free", "keep"] = "free"
+    """As of `omniplan.plan`."""
 
     def __post_init__(self) -> None:
         """Keep the obstacles from being changed."""
@@ -163,7 +166,7 @@ _U_TURN = Scenario(
 _PILLAR = Scenario(
     name="pillar",
     title="Around a pillar while the load keeps its heading",
-    vehicles=("synchro",),
+    vehicles=("synchro", "all-wheel", "mecanum"),
     start=(-1.8, 0.0, 0.0),
     goal=(1.8, 0.0, 0.0),
     obstacles={
@@ -171,6 +174,7 @@ _PILLAR = Scenario(
         "rack": _box(-3.0, -1.4, 3.0, -0.7),
     },
     bounds=(-3.0, -1.4, 3.0, 1.6),
+    heading="keep",
 )
 SCENARIOS: tuple[Scenario, ...] = (_PARKING, _CORNER, _DOCKING, _U_TURN, _PILLAR)
 """All scenarios, figure 1 of the paper first."""

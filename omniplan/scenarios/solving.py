@@ -16,8 +16,9 @@ from omniplan.scenarios.scenario import TITLES, Pose, Scenario, space_of_platfor
 
 __all__ = ["Solution", "pose_of_k", "solve", "solve_all"]
 
-LONGEST = 60.0
-"""Default time for a search, s."""
+LONGEST = 600.0
+"""Default time for a search, s: the iterations end it, or plans would differ with what
+else the machine does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,7 @@ def solve(
         time=LONGEST if time is None else time,
         iterations=task.iterations,
         seed=task.seed if seed is None else seed,
+        heading=task.heading,
     )
     return Solution(space, obstacles, found, TITLES[vehicle])
 

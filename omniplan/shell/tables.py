@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from omniplan.choosing.fitness import Suitability
-from omniplan.choosing.shortfalls import Unfit
+from omniplan.choosing.shortfalls import Shortfall, Unfit
 from omniplan.report import Candidate, Ranking
 from omniplan.wording import refusal
 
@@ -95,6 +96,11 @@ def show_suitability(suitability: Suitability, console: Console) -> None:
 
 def _show_unfit(unfit: Iterable[Unfit], console: Console) -> None:
     for one in unfit:
+        # To the left and to the right it is mostly the same: one line.
+        ways: dict[Shortfall, list[str]] = {}
         for short in one.shortfalls:
-            text = f"unfit [bold]{escape(one.vehicle)}[/]: {escape(str(short))}"
+            ways.setdefault(replace(short, what=""), []).append(short.what)
+        for short, what in ways.items():
+            line = str(replace(short, what=" and ".join(filter(None, what))))
+            text = f"unfit [bold]{escape(one.vehicle)}[/]: {escape(line)}"
             console.print(text, soft_wrap=True)

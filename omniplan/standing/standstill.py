@@ -18,10 +18,11 @@ import numpy.typing as npt
 
 from configspace import PermissibleSpace
 from configspace.omni_curve import curvature_of_ratio
-from omniplan.judging.proof import Parts, Piece, Proof, refused
-from omniplan.judging.rows import Judge, Tolerances
+from omniplan.judging.proof import ROUNDING, Parts, Piece, Proof, refused
+from omniplan.judging.rows import Judge, Row, Tolerances
 from omniplan.motion import Intervals
 from omniplan.standing.reach import is_apart
+from omniplan.standing.rest import Edge, edge_of
 from omniplan.standing.ways import Change, Changer, Configuration, Way
 from omniplan.standing.winding import Anchor, Sweep, sweeps_of, unsettled
 from omniplan.standing.winding_search import SHORT_REST, Track
@@ -31,6 +32,8 @@ __all__ = ["Apart", "Choice", "Reconfiguration", "Standstill", "choose_configura
 UNREACHABLE = 0.75
 """What a piece that is apart counts where a broken limit counts 1: of two refusals the
 one of a permitted configuration tells more."""
+BETWEEN = 0.875
+"""What a piece counts that breaks limits between the samples only."""
 MAX_LABELS = 8
 """So many ways to have come to a piece are kept for each representation."""
 
@@ -58,6 +61,9 @@ class Standstill:
     t0: float
     t1: float
     change: Reconfiguration
+    between: tuple[float, float]
+    """End and start of the parts on which the vehicle moves, s: between t0 and t1, or
+    a little beyond, depending on where the motion is cut."""
 
     @property
     def is_short(self) -> bool:
@@ -87,7 +93,7 @@ class Choice:
 
     def piece_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
         """Return the piece of each part."""
-        cuts = [(stop.t0 + stop.t1) / 2 for stop in self.standstills]
+        cuts = [sum(stop.between) / 2 for stop in self.standstills]
         return np.searchsorted(cuts, (spans.t0 + spans.t1) / 2)
 
     def sign_of(self, spans: Intervals) -> npt.NDArray[np.int64]:
@@ -169,7 +175,9 @@ def choose_configurations(
             (1,), (), (), _apart(parts, pieces, [1] * len(pieces), judge, lost)
         )
     options = _options(proof, judge, pieces, lost, sweeps_of(parts, pieces, wheels))
-    changer = _Changes(parts, pieces, judge, Changer(judge, space, tolerances))
+    changer = _Changes(
+        proof, pieces, judge, Changer(judge, space, tolerances), tolerances
+    )
     best = _best(options, changer, judge)
     return Choice(
         best.signs,
@@ -191,11 +199,13 @@ def _options(
     Only the best of a piece can be part of the best sequence that is valid, and looking
     for ways between configurations is dear.
     """
-    parts, options = proof.parts, []
-    faults = {s: refused(parts.low[s], parts.high[s], judge.rows) for s in proof.signs}
+    parts, whole, options = proof.parts, proof.motion.intervals(), []
+    gaps = itertools.pairwise(pieces)
+    cuts = [(parts.spans.t1[a.last] + parts.spans.t0[b.first]) / 2 for a, b in gaps]
+    piece_of = np.searchsorted(cuts, (whole.t0 + whole.t1) / 2)
     for i, (piece, swept) in enumerate(zip(pieces, sweeps, strict=True)):
-        rows = slice(piece.first, piece.last + 1)
-        broken = {s: float(faults[s][rows].any(axis=0).sum()) for s in proof.signs}
+        rows, own = slice(piece.first, piece.last + 1), piece_of == i
+        broken = {s: _faults(proof, s, rows, own, judge.rows) for s in proof.signs}
         costs: dict[int, float] = {}
         for sign in sorted(broken, key=broken.__getitem__):
             # Where it lies takes time to find out, and may not matter any more.
@@ -213,35 +223,107 @@ def _options(
     return options
 
 
+def _faults(
+    proof: Proof,
+    sign: int,
+    piece: slice,
+    own: npt.NDArray[np.bool_],
+    rows: Sequence[Row],
+) -> float:
+    """Return what a piece costs that breaks limits: their number, at the samples.
+
+    What else is broken between them depends on where the motion was cut. `own` are the
+    intervals between samples that belong to the piece.
+    """
+    parts = proof.parts
+    if not refused(parts.low[sign][piece], parts.high[sign][piece], rows).any():
+        return 0.0
+    at_samples = proof.first.low[sign][own] > 1 + ROUNDING
+    return float(at_samples.any(axis=0).sum()) or BETWEEN
+
+
 class _Changes:
     """What may happen at the standstills between pieces."""
 
     def __init__(
-        self, parts: Parts, pieces: Sequence[Piece], judge: Judge, changer: Changer
+        self,
+        proof: Proof,
+        pieces: Sequence[Piece],
+        judge: Judge,
+        changer: Changer,
+        tolerances: Tolerances,
     ) -> None:
-        self._parts, self._judge, self._changer = parts, judge, changer
-        self._pieces = pieces
+        self._proof, self._parts, self._pieces = proof, proof.parts, pieces
+        self._judge, self._changer, self._tolerances = judge, changer, tolerances
         self._known: dict[tuple[int, int, int], Change] = {}
+        self._edges: dict[int, tuple[Edge, Edge]] = {}
 
-    def rest(self, i: int) -> tuple[float, float]:
-        """Return start and end of the standstill after piece i, s."""
+    def between(self, i: int) -> tuple[float, float]:
+        """Return end and start of the moving parts around standstill i, s."""
         spans = self._parts.spans
         before, after = self._pieces[i], self._pieces[i + 1]
         return float(spans.t1[before.last]), float(spans.t0[after.first])
+
+    def rest(self, i: int) -> tuple[float, float]:
+        """Return start and end of the standstill after piece i, s."""
+        start, end = self._edges_of(i)
+        return start.t, end.t
+
+    def time_for(self, i: int, way: Way) -> float:
+        """Return the time there is for a way at standstill i, s.
+
+        Where the wheels stay as they are it does not matter.
+        """
+        if way.time == 0 and not way.sweeps:
+            return 0.0
+        t0, t1 = self.rest(i)
+        return t1 - t0
 
     def change(self, i: int, before: int, after: int) -> Change:
         """Return the change after piece i between two representations."""
         key = i, before, after
         if key not in self._known:
-            parts, judge = self._parts, self._judge
-            last, first = self._pieces[i].last, self._pieces[i + 1].first
-            t0, t1 = self.rest(i)
+            judge = self._judge
+            start, end = self._moving_edges(i)
+            near = (
+                _configuration(start, before, judge),
+                _configuration(end, after, judge),
+            )
+            if not self._changer.stays(*near):
+                start, end = self._edges_of(i)
             self._known[key] = self._changer.change(
-                _configuration(parts, last, before, judge, at_end=True),
-                _configuration(parts, first, after, judge, at_end=False),
-                t1 - t0,
+                _configuration(start, before, judge),
+                _configuration(end, after, judge),
+                end.t - start.t,
             )
         return self._known[key]
+
+    def _moving_edges(self, i: int) -> tuple[Edge, Edge]:
+        """Return where the moving parts around standstill i end and begin."""
+        before, after = self._pieces[i], self._pieces[i + 1]
+        start = _edge(self._parts, before.last, at_end=True)
+        return start, _edge(self._parts, after.first, at_end=False)
+
+    def _edges_of(self, i: int) -> tuple[Edge, Edge]:
+        """Return where standstill i begins and ends."""
+        if i not in self._edges:
+            knots = self._parts.spans.knot
+            rows = self._pieces[i].last, self._pieces[i + 1].first
+            found = [
+                edge_of(
+                    self._proof.motion,
+                    self._judge,
+                    self._tolerances.standstill,
+                    int(knots[row]),
+                    is_start=is_start,
+                )
+                or moving
+                for row, moving, is_start in zip(
+                    rows, self._moving_edges(i), (True, False), strict=True
+                )
+            ]
+            self._edges[i] = found[0], found[1]
+        return self._edges[i]
 
 
 def _best(
@@ -259,17 +341,33 @@ def _best(
         for sign, option in options[0].items()
     ]
     for i, present in enumerate(options[1:]):
-        t0, t1 = changes.rest(i)
         labels = [
             kept
             for sign, option in present.items()
             for kept in _kept(
-                _extended(label, way, sign, option, t1 - t0)
-                for label in labels
+                _extended(label, way, sign, option, changes.time_for(i, way))
+                for label in _worthwhile(labels, sign, i, changes, judge)
                 for way in changes.change(i, label.signs[-1], sign).ways
             )
         ]
     return min(labels, key=lambda label: label.preference)
+
+
+def _worthwhile(
+    labels: list[_Label], sign: int, i: int, changes: _Changes, judge: Judge
+) -> list[_Label]:
+    """Return the labels that may lead best to a piece in one representation.
+
+    To go on as the wheels stand costs nothing, and to turn them always something; what
+    that is takes time to find out.
+    """
+    same = [label for label in labels if label.signs[-1] == sign]
+    if judge.winding_wheels or not same or len(labels) == 1:
+        return labels
+    if changes.change(i, sign, sign).ways[0].time > 0:
+        return labels
+    least = min(label.cost for label in same)
+    return [label for label in labels if label in same or label.cost < least]
 
 
 def _extended(
@@ -324,7 +422,9 @@ def _standstills(
                 wheel = judge.winding_wheels[j].index
                 turn = way.sweeps[j].turn + 2 * np.pi * unwinding.turns
         made = Reconfiguration(change.start, change.goal, way.time + extra, wheel, turn)
-        found.append(Standstill(*changes.rest(i), made))
+        between = changes.between(i)
+        t0, t1 = changes.rest(i) if made.time > 0 else between
+        found.append(Standstill(t0, t1, made, between))
     return tuple(found)
 
 
@@ -352,21 +452,24 @@ def _apart(
         Apart(
             float(parts.spans.t0[piece.first]),
             float(parts.spans.t1[piece.last]),
-            _configuration(parts, piece.first, sign, judge, at_end=True),
+            _configuration(_edge(parts, piece.first, at_end=True), sign, judge),
         )
         for i, (piece, sign) in enumerate(zip(pieces, signs, strict=True))
         if lost(i, sign)
     )
 
 
-def _configuration(
-    parts: Parts, index: int, sign: int, judge: Judge, *, at_end: bool
-) -> Configuration:
-    """Return (κ_n, β) at an end of a part in one representation."""
-    e = parts.enclosure
-    v, omega = (e.v1, e.omega1) if at_end else (e.v0, e.omega0)
-    own = sign * float(e.sign[index])
-    body = own * (v[index] + 1j * omega[index] * judge.reference)
-    q = own * omega[index] / judge.kappa_g
+def _edge(parts: Parts, index: int, *, at_end: bool) -> Edge:
+    """Return one end of a part and the twist there."""
+    e, spans = parts.enclosure, parts.spans
+    v, omega, t = (e.v1, e.omega1, spans.t1) if at_end else (e.v0, e.omega0, spans.t0)
+    own = float(e.sign[index])
+    return Edge(float(t[index]), own * complex(v[index]), own * float(omega[index]))
+
+
+def _configuration(at: Edge, sign: int, judge: Judge) -> Configuration:
+    """Return (κ_n, β) of a twist in one representation."""
+    body = sign * (at.v + 1j * at.omega * judge.reference)
+    q = sign * at.omega / judge.kappa_g
     kappa_n = float(np.clip(curvature_of_ratio(abs(body), q), -2.0, 2.0))
     return kappa_n, float(np.angle(body)) if abs(body) > 0 else 0.0

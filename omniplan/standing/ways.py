@@ -94,6 +94,17 @@ class Changer:
             ways = [min(ways, key=lambda way: way.time)]
         return Change(start, goal, wheel, turn, tuple(ways))
 
+    def stays(self, start: Configuration, goal: Configuration) -> bool:
+        """Return whether the wheels surely stand alike, however a rest is measured.
+
+        Parameters
+        ----------
+        start, goal : (float, float), 1 and rad
+            Somewhere near the standstill.
+        """
+        _, turn = self._turn(self._on_line(start), self._on_line(goal))
+        return abs(turn) <= self._tolerances.alignment / 2
+
     def _on_line(self, at: Configuration) -> Configuration:
         """Return what a line-mobile vehicle does of it: it slips, but its β stays."""
         line = self._space.line_beta

@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from configspace import Problem
 from omniplan.errors import InvalidTrajectory
-from omniplan.motion import PoseMotion, spline, stops_of
+from omniplan.motion import PoseMotion, stops_of
 from omniplan.path import Path
 from omniplan.samples import HEADING_LENGTH, locked
+from omniplan.splines import spline
 from omniplan.trajectory import Trajectory
 
 __all__ = ["PathMotion", "PathPiece", "path_of", "pieces_of"]

@@ -52,7 +52,11 @@ def table_of_trajectories(trajectories: Sequence[Trajectory | Path]) -> pa.Table
         If there are none, or their forms differ.
     """
     names, sizes, columns = columns_of([timed(one) for one in trajectories])
-    owner = np.repeat(np.arange(len(names), dtype=np.int32), sizes)
+    # One byte for each row rather than four, where there are few names.
+    kind: Any = next(
+        k for k in (np.int8, np.int16, np.int32) if len(names) <= np.iinfo(k).max
+    )
+    owner = np.repeat(np.arange(len(names), dtype=kind), sizes)
     owners = pa.DictionaryArray.from_arrays(owner, pa.array(names, pa.string()))
     return pa.table({"trajectory": owners, **columns})
 

@@ -20,7 +20,7 @@ import logging
 import os
 import secrets
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Any, Self
@@ -54,8 +54,9 @@ class Record:
     version: Version
     vehicle: str | None
     """The vehicle file as JSON; None: deleted."""
-    requests: tuple[str, ...] = ()
-    """Names of the requests that made the newest changes; see `after`."""
+    requests: tuple[str, ...] = field(default=(), compare=False)
+    """Names of the requests that made the newest changes; see `after`. Servers that
+    heard of changes in another order may know of others."""
 
     def __post_init__(self) -> None:
         checked_chunk("vehicle", self.id)

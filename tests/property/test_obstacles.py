@@ -55,6 +55,53 @@ def any_pose(rng: np.random.Generator, size: float = 6.0) -> FloatArray:
     return np.array([*rng.uniform(0, size, 2), rng.uniform(-4, 4)])
 
 
+@given(seed=seeds, clearance=st.sampled_from([0.0, 0.4]), size=st.sampled_from([6, 40]))
+@settings(max_examples=8, deadline=None)
+def test_what_is_clear_at_a_glance_is_free_whatever_the_heading(
+    seed: int, clearance: float, size: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    polygons = hall(rng, size=size)
+    obstacles = Obstacles.from_polygons(polygons)
+    checker = CollisionChecker(BOX, obstacles, clearance, (-2, -2, size + 2, size + 2))
+    radius = float(np.linalg.norm(BOX, axis=1).max())
+    clear = 0
+    for _ in range(40):
+        (x0, y0), (x1, y1) = rng.uniform(-3, size + 3, (2, 2))
+        if not checker.is_line_clear(x0, y0, x1, y1):
+            continue
+        clear += 1
+        share = np.linspace(0, 1, 12)[:, None]
+        for x, y in np.array([x0, y0]) * (1 - share) + np.array([x1, y1]) * share:
+            outside = min(x + 2, y + 2, size + 2 - x, size + 2 - y)
+            assert outside > clearance + radius
+            point = np.array([[x, y], [x + 1e-9, y], [x, y + 1e-9]])
+            true = min(naive_collision.distance(point, each) for each in polygons)
+            assert true > clearance + radius - 1e-8
+        headings = rng.uniform(-np.pi, np.pi, 2)
+        move = Move.straight((x0, y0, headings[0]), (x1, y1, headings[1]))
+        assert checker.is_motion_free(move)
+    assert size < 40 or clear > 5
+
+
+@given(seed=seeds)
+@settings(max_examples=10, deadline=None)
+def test_open_floor_is_free(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    polygons = hall(rng, size=20.0)
+    checker = CollisionChecker(BOX, Obstacles.from_polygons(polygons), 0.1)
+    poses = np.column_stack([rng.uniform(-1, 21, (200, 2)), rng.uniform(-4, 4, 200)])
+    for pose in poses:
+        checker.is_free(pose)
+    cells, scale = checker.open_floor
+    assert cells
+    for i, j in list(cells)[:8]:
+        places = (np.array([i, j]) + rng.uniform(0, 1, (3, 2))) / scale
+        for x, y in places:
+            pose = np.array([x, y, rng.uniform(-4, 4)])
+            assert naive_distance(BOX, polygons, pose) > 0.1
+
+
 @pytest.mark.parametrize("footprint", [BOX, L_SHAPE], ids=["box", "l-shape"])
 @given(seed=seeds, clearance=st.sampled_from([0.0, 0.05, 0.4]))
 @settings(max_examples=12, deadline=None)
@@ -95,7 +142,7 @@ def any_move(rng: np.random.Generator) -> Move:
 
 @pytest.mark.parametrize("footprint", [BOX, L_SHAPE], ids=["box", "l-shape"])
 @given(seed=seeds, clearance=st.sampled_from([0.0, 0.05]))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_moves_agree_with_dense_sampling(
     footprint: FloatArray, seed: int, clearance: float
 ) -> None:

@@ -12,7 +12,7 @@ from random_halls import bodied_vehicle, random_hall, size_of
 import configspace
 import omniplan
 from configspace import Grid
-from configspace.testing_vehicles import ALL_KINDS, VehicleKind
+from configspace.testing import ALL_KINDS, VehicleKind
 from omniplan import PlanStatus
 from omniplan.obstacles import Obstacles
 

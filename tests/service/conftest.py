@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -101,10 +101,16 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
         space: configspace.PermissibleSpace,
         *,
         allow_unreachable: bool = False,
+        checkpoint: Callable[[], None],
     ) -> omniplan.Report:
         gate.entered.release()
         assert gate.opened.wait(30)
-        return omniplan.validate(trajectory, space, allow_unreachable=allow_unreachable)
+        return omniplan.validate(
+            trajectory,
+            space,
+            allow_unreachable=allow_unreachable,
+            checkpoint=checkpoint,
+        )
 
     monkeypatch.setattr("services.answering.handlers.validate", held)
     yield gate

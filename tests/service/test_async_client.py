@@ -27,8 +27,8 @@ def run(coroutine: Coroutine[Any, Any, T]) -> T:
 def public(kind: type) -> dict[str, inspect.Signature]:
     return {
         name: inspect.signature(member)
-        for name, member in vars(kind).items()
-        if inspect.isfunction(member) and not name.startswith("_")
+        for name, member in inspect.getmembers(kind, inspect.isfunction)
+        if not name.startswith("_")
     }
 
 
@@ -132,6 +132,7 @@ def test_a_cancelled_task_cancels_its_question(
 def test_closing_the_parts_cancels_what_is_left(
     server: Server, trajectories: Trajectories, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("services.answering.batches.FIRST", 1)
     monkeypatch.setattr("services.answering.batches._next_size", lambda *_: 1)
 
     async def ask() -> None:

@@ -64,6 +64,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
         assert held.opened.wait(30)
         return 1
 
+    monkeypatch.setattr("services.answering.batches.FIRST", 1)
     monkeypatch.setattr("services.answering.batches._next_size", one_by_one)
     yield held
     held.opened.set()

@@ -31,9 +31,6 @@ from services.wire.session import Peer
 pytestmark = pytest.mark.service
 
 GRID = configspace.Grid(40, 72)
-# zenoh 1.10 leaves what is sent within milliseconds of a kill without an answer until
-# its own timeout (see docs/registration.md): time must be left to ask again.
-ATTEMPT = 5.0
 AGV = configspace.load_vehicle("mecanum")
 
 
@@ -410,7 +407,7 @@ class Load:
         ]
 
     def _ask(self, index: int, endpoints: list[str]) -> None:
-        with Client(endpoints, timeout=30.0, attempt_timeout=ATTEMPT) as client:
+        with Client(endpoints, timeout=30.0) as client:
             while not self._is_over.is_set():
                 for (vehicle, name), expected in self._expected.items():
                     (report,) = client.validate([self._by_name[name]], vehicle)
@@ -447,9 +444,7 @@ def run_kills(fleet: Fleet, trajectories: Trajectories, folder: Path, n: int) ->
         for process in processes:
             process.wait_until_ready()
         stack.callback(lambda: kill_all(processes))
-        manager = stack.enter_context(
-            Client(endpoints, timeout=30.0, attempt_timeout=ATTEMPT)
-        )
+        manager = stack.enter_context(Client(endpoints, timeout=30.0))
         manager.wait_until_ready()
         load = Load(endpoints, fleet, trajectories, 4)
         version = manager.register(described("0"), "absent")

@@ -100,7 +100,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, name: str) -> Iterator[None]:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"configspace.storage.os.{name}", fail)
+        patch.setattr(f"configspace.files.os.{name}", fail)
         yield
 
 

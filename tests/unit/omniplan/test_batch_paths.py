@@ -50,6 +50,11 @@ def test_rows_are_those_of_select_and_of_batches(space_of: SpaceOf) -> None:
             assert row["duration"] == math.inf
             assert math.isnan(row["margin"])
             assert row["value"] is None
+            assert row["u"] == one.fault.u
+    path = motions[0]
+    assert isinstance(path, Path)
+    assert 0 <= by_pair["aside", "differential"]["u"] <= path.parameter[-1]
+    assert by_pair["line", "mecanum"]["u"] is None
     assert not by_pair["aside", "differential"]["valid"]
     expected = validate_many([timed], fleet).to_pylist()
     assert [by_pair["timed", name] for name in NAMES] == expected
@@ -61,6 +66,7 @@ def test_a_data_sheet_alone_says_so(space_of: SpaceOf) -> None:
     batch = PathBatch([Path.from_poses(LINE)], [sheet])
     (row,) = pa.Table.from_batches(list(batch.verdicts())).to_pylist()
     assert row["limit"] == "VEHICLE_NOT_KNOWN"
+    assert row["u"] is None
     assert not row["valid"]
 
 

@@ -38,15 +38,17 @@ def space_of(name: str, grid: Grid = GRID) -> PermissibleSpace:
     return build_space(configspace.load_vehicle(name), grid, cache=False)
 
 
-def corner(first: float, second: float, dwell: float, slow: float) -> Trajectory:
+def corner(
+    first: float, second: float, dwell: float, slow: float, samples: int = 8
+) -> Trajectory:
     """Two straight runs of 1 m in directions of the vehicle, a rest between."""
-    share = np.linspace(0, 1, 9)[1:]
+    share = np.linspace(0, 1, samples + 1)[1:]
     smooth = share**3 * (10 + share * (6 * share - 15))
     t, poses = [0.0], [np.zeros(3)]
     for direction in (first, second):
         base = poses[-1]
         for f in smooth:
-            t.append(t[-1] + slow / 8)
+            t.append(t[-1] + slow / samples)
             step = f * np.array([math.cos(direction), math.sin(direction), 0.0])
             poses.append(base + step)
         if direction == first and dwell:
@@ -96,19 +98,58 @@ def test_standstills_with_a_change_of_wheels_are_those_of_validate() -> None:
     for row, report in pairs:
         assert row["valid"] == report.valid, report.headline
         if report.valid:
-            # The time there is counts from where the vehicle surely stands.
-            assert row["margin"] <= report.margin + 2e-3
+            assert row["margin"] == pytest.approx(report.margin, abs=2e-3)
         if row["limit"] == "RECONFIGURATION" and not report.valid:
             told = report.headline
             assert told is not None
             assert (told.limit, told.wheel) == (row["limit"], row["wheel"])
-            assert row["t"] == pytest.approx(told.t, abs=0.1)
-            assert row["value"] == pytest.approx(told.value, rel=1e-3)
+            for name in ("t", "value", "bound"):
+                assert row[name] == pytest.approx(getattr(told, name), rel=1e-6)
             assert row["unit"] == "s"
     valid = [row["valid"] for row, _ in pairs]
     assert any(valid)
     assert not all(valid)
     assert batch.asked <= len(pairs) / 3
+
+
+def test_dense_samples_around_a_rest_are_left_to_the_kernels() -> None:
+    # The interval before the sample at rest ends slowly, but not at rest itself.
+    spaces = [space_of(name) for name in ("choreo-frc-swerve", "mpo-700", "exomars")]
+    pairs, batch = both(
+        [
+            corner(0.0, math.radians(angle), dwell, 6.0, samples)
+            for samples in (60, 200)
+            for angle in (90.0, 150.0)
+            for dwell in (3.0, 0.0)
+        ],
+        spaces,
+    )
+    assert batch.asked == 0
+    for row, report in pairs:
+        assert row["valid"] == report.valid
+        told = report.headline
+        if told is not None:
+            assert (told.limit, told.wheel) == (row["limit"], row["wheel"])
+
+
+@pytest.mark.parametrize("name", ["romea-4ws", "four-wheel-steering", "robotis-ffw"])
+def test_no_way_is_searched_to_where_wheels_cannot_stand(name: str) -> None:
+    space = space_of(name)
+    pairs, batch = both(
+        [
+            corner(0.0, math.radians(a), d, 6.0)
+            for a in (100.0, 45.0)
+            for d in (0.0, 3.0)
+        ],
+        [space],
+    )
+    for row, report in pairs:
+        told = report.headline
+        assert told is not None
+        assert (row["valid"], row["limit"]) == (report.valid, told.limit)
+        assert row["wheel"] == told.wheel
+        assert row["margin"] == pytest.approx(report.margin, rel=1e-2)
+    assert batch.asked == 0
 
 
 def own_trajectories(space: PermissibleSpace, count: int) -> list[Trajectory]:

@@ -109,8 +109,11 @@ def test_select_says_what_is_unfit(capsys: Capture) -> None:
     assert "│ agv-1   │" in out
     assert "│ agv-2   │" in out
     assert "180.0°" in out
-    line = "unfit ackermann: crab 90 deg at 0.5 m/s: to the left, 0.5 m/s asked, "
-    assert line + "nothing offered [STEER_RANGE, FIXED_WHEEL of wheel front" in out
+    line = "unfit ackermann: crab 90 deg at 0.5 m/s: to the left and to the right, "
+    assert (
+        line + "0.5 m/s asked, nothing offered [STEER_RANGE, FIXED_WHEEL of wheel front"
+        in out
+    )
 
 
 def test_requirements_need_no_trajectory(capsys: Capture) -> None:

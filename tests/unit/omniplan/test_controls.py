@@ -41,6 +41,7 @@ def _driven(
         space.tables.load,
         *controls._rate_tables(space),
         space.line_beta is not None,
+        space.is_translating,
         space.kappa_g,
         FINE,
         np.array(start),
@@ -156,6 +157,19 @@ def test_kpiece_explores_as_well() -> None:
         method="control",
     )
     assert plan.is_found, plan.message
+
+
+def test_a_synchro_drive_is_driven_by_controls_too() -> None:
+    space = configspace.build_space(configspace.load_vehicle("synchro-drive"))
+    wall = Obstacles.from_polygons([WALL])
+    start, goal = (2, 2, 0), (10, 3, 0)
+    plan = omniplan.plan(
+        start, goal, space, wall, bounds=HALL, time=60.0, method="control"
+    )
+    trajectory = plan.raise_for_status()
+    assert np.ptp(trajectory.samples[:, 2]) < 1e-9
+    checker = CollisionChecker(space, wall, bounds=HALL)
+    assert checker.first_hit_of_trajectory(trajectory) is None
 
 
 @pytest.mark.slow

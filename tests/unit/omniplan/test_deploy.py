@@ -57,6 +57,16 @@ def test_the_kill_comes_after_the_time_to_stop(unit: dict[str, list[str]]) -> No
     assert int(unit["TimeoutStopSec"][0]) > ServiceConfig().stop_within
 
 
+def test_the_unit_leaves_room_for_the_registered_vehicles(
+    unit: dict[str, list[str]],
+) -> None:
+    (most,) = unit["MemoryMax"]
+    assert most.endswith("G")
+    # The program itself and its work take half a gigabyte.
+    least = ServiceConfig().registration.max_memory + 2**29
+    assert int(most[:-1]) * 2**30 >= least
+
+
 def test_every_variable_of_the_examples_is_known(unit: dict[str, list[str]]) -> None:
     known = {*variables(), "OMNIPLAN_CACHE", "OMNIPLAN_CONFIG"}
     named = set(OURS.findall(" ".join(unit["Environment"]))) | set(

@@ -267,6 +267,32 @@ def test_a_foreign_motion_is_as_fast_as_its_owner_may(vehicle: Vehicle) -> None:
             assert speed.max() <= e.scale_high[i] * (1 + 1e-12)
 
 
+@pytest.mark.parametrize("name", configspace.catalog())
+def test_the_speed_of_every_owner_is_bounded_and_closely_so(name: str) -> None:
+    """By limits of every kind: offsets, lateral acceleration and tipping among them."""
+    owner, rng = configspace.load_vehicle(name), np.random.default_rng(4)
+    line, n = owner.mobility.line_beta, 5
+    kappa_n = np.clip(np.cumsum(rng.normal(0, 0.6, n)), -2, 2)
+    if owner.mobility.is_translating:
+        kappa_n[:] = 0
+    beta = np.cumsum(rng.normal(0, 0.5, n)) if line is None else np.full(n, line)
+    v_n = np.clip(np.cumsum(rng.normal(0, 0.5, n)), -1, 1)
+    given = Trajectory.from_omni_curve(np.arange(n), kappa_n, beta, v_n, owner)
+    motion = motion_of(given, is_own=False)
+    parts = motion.intervals()
+    for _ in range(4):
+        parts = parts.halved(np.ones(parts.t0.shape, dtype=bool))
+    e = motion.enclose(parts)
+    most = np.zeros(parts.t0.shape)
+    for f in np.linspace(0, 1, 17):
+        t = parts.t0 + f * (parts.t1 - parts.t0)
+        most = np.maximum(most, motion.enclose(Intervals(parts.knot, t, t)).scale0)
+    assert (most <= e.scale_high * (1 + 1e-9) + 1e-12).all()
+    moving = most > 0.05 * most.max()
+    if moving.any():
+        assert np.median((e.scale_high / np.maximum(most, 1e-12))[moving]) < 1.05
+
+
 def test_the_reference_point_moves_with_the_body() -> None:
     # Turning at 1 rad/s about a point 0.5 m ahead of the described one.
     trajectory = Trajectory.from_twists(

@@ -216,7 +216,7 @@ def test_no_manoeuvre_is_an_error() -> None:
 
 
 def test_verdict_text_names_duration_or_first_violation() -> None:
-    assert verdict_text(report("a")) == "6.4 s"
+    assert verdict_text(report("a")) == "6.40 s"
     late, early = (
         violation("WHEEL_SPEED", None, 2.0),
         violation("STEER_RATE", "w1", 1.0),

@@ -112,7 +112,7 @@ def violation(limit: str, value: float | None, bound: float, proved: bool) -> Vi
     )
 
 
-def test_the_headline_is_proved_then_of_the_shape_then_the_largest() -> None:
+def test_the_headline_is_proved_at_a_sample_of_the_shape_the_largest() -> None:
     report = validate(
         Trajectory.from_twists([0, 1], [[0.1, 0, 0]] * 2),
         configspace.build_space(
@@ -122,13 +122,37 @@ def test_the_headline_is_proved_then_of_the_shape_then_the_largest() -> None:
     speed, faster = violation("SPEED", 2, 1, True), violation("SPEED", 3, 1, True)
     shape = violation("STEER_RANGE", 2, 1, True)
     maybe = violation("SINGULAR", 0, 0, False)
+    between = replace(shape, excess_at_samples=0.0)
     for chosen, given in (
+        (speed, (between, speed)),
+        (between, (maybe, between)),
         (faster, (speed, faster)),
         (shape, (faster, shape)),
         (speed, (maybe, speed)),
         (maybe, (maybe,)),
     ):
         assert replace(report, valid=False, violations=given).headline == chosen
+
+
+def test_what_is_broken_between_samples_only_is_told_where_halving_finds_it() -> None:
+    """Poses 2 s apart: what is too fast between them is found in their middle."""
+    space = configspace.build_space(
+        configspace.load_vehicle("mecanum"), Grid(40, 72), cache=False
+    )
+    still = np.zeros(3)
+    for far, at_samples in ((3.0, False), (8.0, False), (3.0, True)):
+        aside = np.array([far, 0.1 * far, 0.2])
+        poses, t = [still, still, aside, aside], np.array([0.0, 1.0, 3.0, 4.0])
+        if at_samples:
+            poses.insert(2, aside / 2)
+            t = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+        report = validate(Trajectory.from_poses(t, poses), space)
+        told = report.headline
+        assert told is not None
+        # All wheels of a side are alike in neither motion; the worst one is told.
+        worst = max((v for v in report.violations), key=lambda v: v.excess)
+        assert (told.limit, told.wheel) == (worst.limit, worst.wheel)
+        assert told.excess_at_samples == pytest.approx(worst.excess, rel=1e-2)
 
 
 def test_excess_is_how_far_beyond_the_bound_on_its_own_scale() -> None:

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from omniplan.planning.moves import Move
-from omniplan.planning.route import Route, goes_on
+from omniplan.planning.moves import Move, goes_on
+from omniplan.planning.route import Route
 from omniplan.timing.path_motion import pieces_of
 
 

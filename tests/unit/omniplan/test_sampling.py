@@ -19,6 +19,7 @@ from configspace import PermissibleSpace
 from configspace.errors import InvalidInput
 from configspace.omni_curve import curvature_of_ratio
 from omniplan import sampling
+from omniplan.obstacles import CollisionChecker, Obstacles
 from omniplan.planning.moves import Move
 from omniplan.sampling.curves import arcs_of
 from omniplan.sampling.ompl_bindings import base, geometric, quiet, seeded
@@ -181,6 +182,35 @@ def test_motions_are_held_against_obstacles_as_a_whole(
     assert not si.checkMotion(_state(si, -5, 0, 0), _state(si, 5, 0, 1))
     assert si.checkMotion(_state(si, -5, 0.1, 0), _state(si, 5, 0.1, 1))
     assert disc.motions[-1].turn == pytest.approx(1.0)
+
+
+def test_states_and_motions_agree_with_the_collision_checker(
+    spaces: dict[str, PermissibleSpace],
+) -> None:
+    """What is decided at a glance, and what is not, near and far."""
+    rng = np.random.default_rng(4)
+    pillars = [
+        [(x, y), (x + 0.5, y), (x + 0.5, y + 0.5), (x, y + 0.5)]
+        for x, y in rng.uniform(-9, 9, (6, 2))
+    ]
+    space, si = spaces["mecanum"], _information()
+    halls = Obstacles.from_polygons(pillars)
+    checker, other = (CollisionChecker(space, halls, 0.1) for _ in range(2))
+    sampling.equip(si, space, checker)
+    poses = np.column_stack([rng.uniform(-9.9, 9.9, (80, 2)), rng.uniform(-3, 3, 80)])
+    for _ in range(2):  # the second time the floor is known
+        answers = [si.isValid(_state(si, *pose)) for pose in poses]
+        assert answers == [other.is_free(pose) for pose in poses]
+    motions = [
+        si.checkMotion(_state(si, *one), _state(si, *two))
+        for one, two in itertools.pairwise(poses)
+    ]
+    assert motions == [
+        other.is_motion_free(Move.straight(one, two))
+        for one, two in itertools.pairwise(poses)
+    ]
+    assert 0 < sum(motions) < len(motions)
+    assert 0 < sum(answers) < len(answers)
 
 
 def test_without_a_checker_the_programs_own_states_are_asked(

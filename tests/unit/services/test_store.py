@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -59,9 +60,16 @@ class StoreMachine(RuleBasedStateMachine):
         self.store = VehicleStore(self.folder)
         self.instance = self.store.instance
 
-    @rule(name=NAMES, counter=st.integers(1, 10), vehicle=FILES)
-    def write(self, name: str, counter: int, vehicle: str | None) -> None:
-        self.expected[name] = record(name, counter, vehicle)
+    @rule(
+        name=NAMES,
+        counter=st.integers(1, 10),
+        vehicle=FILES,
+        requests=st.lists(NAMES, max_size=3).map(tuple),
+    )
+    def write(
+        self, name: str, counter: int, vehicle: str | None, requests: tuple[str, ...]
+    ) -> None:
+        self.expected[name] = replace(record(name, counter, vehicle), requests=requests)
         self.store.write(self.expected[name])
 
     @rule()
@@ -99,6 +107,9 @@ class StoreMachine(RuleBasedStateMachine):
     @invariant()
     def holds_what_was_written(self) -> None:
         assert dict(self.store.records) == self.expected
+        # Requests are no part of what a record says, and are kept all the same.
+        for name, record in self.expected.items():
+            assert self.store.records[name].requests == record.requests
         assert self.store.instance == self.instance
         assert len(vehicle_files(self.folder)) == len(self.expected)
         assert len(list((self.folder / "damaged").iterdir())) == self.n_damaged

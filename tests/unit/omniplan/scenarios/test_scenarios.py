@@ -97,9 +97,17 @@ def test_mecanum_parks_in_the_least_area_and_ackermann_in_the_most() -> None:
     assert duration["mecanum"] < duration["all-wheel"] < duration["ackermann"]
 
 
-def test_the_load_keeps_its_heading_around_the_pillar() -> None:
+def test_an_ackermann_vehicle_takes_the_corner_in_one_go() -> None:
+    task = replace(scenario("corner"), iterations=1000)
+    solution = solve(task, "ackermann")
+    assert_proved(task, solution)
+    assert solution.plan.stops == 0
+
+
+@pytest.mark.parametrize("name", scenario("pillar").vehicles)
+def test_the_load_keeps_its_heading_around_the_pillar(name: str) -> None:
     task = scenario("pillar")
-    solution = solve(task, "synchro")
+    solution = solve(task, name)
     assert_proved(task, solution)
     trajectory = solution.plan.raise_for_status()
     assert np.ptp(trajectory.samples[:, 2]) < 1e-9

@@ -1,7 +1,6 @@
-"""Random vehicles and configurations, and what every space must keep: for tests.
+"""Permitted speeds by the rigid-body formula ``v + ω x w``: the twin of spaces.
 
-Import this module in tests only: the strategies need hypothesis, which is imported
-when one is asked for. Everything random comes from a passed `numpy.random.Generator`.
+Written apart from `configspace.limits` and `configspace.exact` on purpose.
 """
 
 from __future__ import annotations
@@ -9,20 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from configspace.grid import Grid
-from configspace.omni_curve import from_twist
-from configspace.space import PermissibleSpace
-from configspace.testing_vehicles import (
-    ALL_KINDS,
-    VEHICLE_KINDS,
-    VehicleKind,
-    random_vehicle,
-)
 from configspace.vehicle import (
     Castor,
     FixedWheel,
@@ -32,90 +21,13 @@ from configspace.vehicle import (
     Vehicle,
 )
 
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
-
-__all__ = [
-    "ALL_KINDS",
-    "VEHICLE_KINDS",
-    "RigidBody",
-    "VehicleKind",
-    "assert_sound",
-    "configurations",
-    "grids",
-    "random_configurations",
-    "random_vehicle",
-    "rigid_body",
-    "vehicles",
-]
+__all__ = ["RigidBody", "rigid_body"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-
-def random_configurations(
-    rng: np.random.Generator, vehicle: Vehicle, count: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return configurations, many of them where something happens.
-
-    Half are uniform; the rest are at or next to the kinks κ_n = 0, ±1, ±2, the seam
-    β = ±π, the singular points of wheels and the ends of steering ranges. For a
-    line-mobile vehicle β is mostly its constant one.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    vehicle : Vehicle
-    count : int
-
-    Returns
-    -------
-    kappa_n : (count,) float, 1, [-2, 2]
-    beta : (count,) float, rad
-    """
-    kappa_n = rng.uniform(-2, 2, count)
-    beta = rng.uniform(-np.pi, np.pi, count)
-    near = rng.choice([-1.0, 0.0, 1.0], count) * 10.0 ** rng.uniform(-17, -1, count)
-    case = rng.integers(0, 10, count)
-    kinks = rng.choice([-2.0, -1.0, 0.0, 1.0, 2.0], count)
-    kappa_n = np.where(case == 5, kinks + near, kappa_n)
-    seams = rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], count)
-    beta = np.where((case == 6) | ((case == 5) & (near > 0)), seams + near, beta)
-    steered = [w for w in vehicle.wheels if isinstance(w, SteerableWheel)]
-    if steered:
-        pick = rng.integers(0, len(steered), count)
-        w = np.array([wheel.position - vehicle.reference for wheel in steered])[pick]
-        # The centre of rotation on the wheel: v = -ω x w.
-        omega = rng.choice([-1.0, 1.0], count)
-        still = np.stack([omega * w.imag, -omega * w.real, omega], axis=-1)
-        on_k, on_beta, _ = from_twist(still, vehicle.boundary_curvature)
-        apart = near * rng.uniform(-1, 1, count)
-        kappa_n = np.where(case == 7, on_k + apart, kappa_n)
-        beta = np.where(case == 7, on_beta + near, beta)
-        # A wheel at the end of its range: Im(z exp(-jα)) = 0 solved for β.
-        ends = np.array([w.steering_range for w in steered])[pick, pick % 2]
-        ends = np.where(np.isfinite(ends), ends, np.pi)
-        c = np.minimum(1.0, 2 - np.abs(np.clip(kappa_n, -2, 2)))
-        s = np.clip(kappa_n, -1, 1)
-        b = 1j * vehicle.boundary_curvature * w
-        sine = s * (b * np.exp(-1j * ends)).imag / np.maximum(c, 1e-9)
-        bend = np.arcsin(np.clip(sine, -1, 1))
-        beta = np.where(case >= 8, ends - bend + near, beta)
-        reach = np.array([wheel.offsets[0] for wheel in steered])[pick]
-        if reach.any():
-            # The centre of rotation under the wheel, beside its axis: it stands still.
-            spot = w + reach * np.exp(1j * rng.uniform(-np.pi, np.pi, count))
-            still = np.stack([omega * spot.imag, -omega * spot.real, omega], axis=-1)
-            on_k, on_beta, _ = from_twist(still, vehicle.boundary_curvature)
-            here = (case == 7) & (rng.random(count) < 0.5)
-            kappa_n = np.where(here, on_k + apart, kappa_n)
-            beta = np.where(here, on_beta + near, beta)
-    line = vehicle.mobility.line_beta
-    if line is not None:
-        beta = np.where(rng.random(count) < 0.9, line, beta)
-    if vehicle.mobility.is_translating:
-        kappa_n = np.where(rng.random(count) < 0.9, 0.0, kappa_n)
-    return np.clip(kappa_n, -2, 2), beta
+_SPARE_ROUNDING = 1e-12
+_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -166,10 +78,6 @@ class RigidBody:
         fine = np.minimum(self.stillness, 1.0) * np.minimum(np.abs(self.margin), 1.0)
         fine = np.minimum(fine, np.abs(self.spare))
         return np.asarray((fine > room) & (self.stillness > room))
-
-
-_SPARE_ROUNDING = 1e-12
-_GRAVITY = 9.81
 
 
 def rigid_body(
@@ -367,104 +275,6 @@ def _hull(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
                 there = p
         here = there
     return corners
-
-
-def assert_sound(
-    space: PermissibleSpace,
-    vehicle: Vehicle,
-    kappa_n: npt.ArrayLike,
-    beta: npt.ArrayLike,
-) -> None:
-    """Fail unless the space promises nothing that the rigid-body formula forbids.
-
-    Checks `v_max` and `contains` in both driving directions, and, if the space knows
-    its vehicle, that clearly permitted configurations are not refused.
-
-    Parameters
-    ----------
-    space : PermissibleSpace
-        Of this vehicle, built or read from a data sheet.
-    vehicle : Vehicle
-    kappa_n : (...,) float, 1, [-2, 2]
-    beta : (...,) float, rad
-
-    Raises
-    ------
-    AssertionError
-        Naming the first configuration that breaks the promise.
-    """
-    kappa_n, beta = np.broadcast_arrays(
-        np.asarray(kappa_n, np.float64), np.asarray(beta, np.float64)
-    )
-    for reverse in (False, True):
-        truth = rigid_body(vehicle, kappa_n, beta, reverse=reverse)
-        promised = space.v_max(kappa_n, beta, reverse=reverse)
-        _fail_where(
-            truth.is_blocked & (promised > 0), "blocked but permitted", kappa_n, beta
-        )
-        too_fast = promised > truth.v_max * (1 + 1e-12)
-        _fail_where(too_fast, "faster than permitted", kappa_n, beta)
-        v_s = -promised if reverse else promised
-        moves = (promised > 0) & np.isfinite(promised)
-        held = space.contains(kappa_n, beta, v_s)
-        _fail_where(moves & ~held, "v_max itself is refused", kappa_n, beta)
-        over = v_s * (1 + 1e-9)
-        taken = space.contains(kappa_n, beta, over)
-        _fail_where(moves & taken, "more than v_max is taken", kappa_n, beta)
-        if space.vehicle is not None:
-            refused = truth.is_clear() & (truth.permitted > 0) & (promised <= 0)
-            _fail_where(refused, "clearly permitted but refused", kappa_n, beta)
-
-
-def vehicles(
-    kinds: tuple[VehicleKind, ...] = VEHICLE_KINDS,
-) -> SearchStrategy[Vehicle]:
-    """Return a hypothesis strategy for vehicles of these kinds."""
-    from hypothesis import strategies
-
-    def build(kind: VehicleKind, seed: int) -> Vehicle:
-        return random_vehicle(np.random.default_rng(seed), kind)
-
-    seeds = strategies.integers(0, 2**32 - 1)
-    return strategies.builds(build, strategies.sampled_from(kinds), seeds)
-
-
-def configurations() -> SearchStrategy[tuple[float, float]]:
-    """Return a hypothesis strategy for (κ_n, β), kinks and seam included."""
-    from hypothesis import strategies as st
-
-    tiny = st.sampled_from([0.0, 1e-16, -1e-16, 1e-12, -1e-12, 1e-6, -1e-6])
-    kinks = st.sampled_from([-2.0, -1.0, 0.0, 1.0, 2.0])
-    seams = st.sampled_from([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi])
-    near_kink = st.builds(lambda k, d: min(2.0, max(-2.0, k + d)), kinks, tiny)
-    near_seam = st.builds(lambda b, d: float(b + d), seams, tiny)
-    return st.tuples(
-        st.one_of(near_kink, st.floats(-2, 2)),
-        st.one_of(near_seam, st.floats(-np.pi, np.pi)),
-    )
-
-
-def grids(largest: int = 48) -> SearchStrategy[Grid]:
-    """Return a hypothesis strategy for coarse grids, from 16 × 24, quick to build."""
-    from hypothesis import strategies as st
-
-    quarters = st.integers(4, max(4, largest // 4))
-    return st.builds(
-        lambda quarter, n_beta: Grid(4 * quarter, n_beta),
-        quarters,
-        st.integers(24, max(24, largest)),
-    )
-
-
-def _fail_where(
-    wrong: BoolArray, what: str, kappa_n: FloatArray, beta: FloatArray
-) -> None:
-    if wrong.any():
-        first = tuple(np.argwhere(wrong)[0])
-        raise AssertionError(
-            f"{what} at {int(wrong.sum())} of {wrong.size} configurations, first "
-            f"kappa_n = {float(kappa_n[first])!r}, beta = {float(beta[first])!r}"
-        )
 
 
 def _rolling(

@@ -1,171 +1,26 @@
-"""Random vehicles of every kind of undercarriage, with every kind of limit: for tests.
-
-`configspace.testing` is the module to import.
-"""
+"""Random wheels of every kind of undercarriage, as vehicle files have them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from itertools import combinations
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any
 
 import numpy as np
 
-from configspace.vehicle import Vehicle
-from configspace.vehicle_io import vehicle_from_data
-
-__all__ = ["ALL_KINDS", "VEHICLE_KINDS", "VehicleKind", "random_vehicle"]
-
-PlainKind: TypeAlias = Literal[
-    "steered", "mixed", "differential", "ackermann", "mecanum", "omni"
-]
-VehicleKind: TypeAlias = (
-    PlainKind
-    | Literal["offset", "turntable", "loaded", "guaranteed", "skid", "synchro"]
-)
-
-VEHICLE_KINDS: tuple[PlainKind, ...] = get_args(PlainKind)
-"""The plain kinds of undercarriage."""
-ALL_KINDS: tuple[VehicleKind, ...] = (
-    *VEHICLE_KINDS,
-    "offset",
-    "turntable",
-    "loaded",
-    "guaranteed",
-    "skid",
-    "synchro",
-)
-"""Every kind that `random_vehicle` builds. A loaded one may tip and a guaranteed one
-has a singular zone; what they stand on is drawn from the other kinds."""
+__all__ = ["WHEELS", "random_point", "random_speed"]
 
 
-def random_vehicle(
-    rng: np.random.Generator, kind: VehicleKind | None = None
-) -> Vehicle:
-    """Return a random vehicle whose speed is bounded everywhere.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    kind : str, optional
-        One of `ALL_KINDS`; default any of `VEHICLE_KINDS`.
-
-    Examples
-    --------
-    >>> random_vehicle(np.random.default_rng(0), "mecanum").wheels[0].type
-    'mecanum'
-    """
-    kind = kind or VEHICLE_KINDS[int(rng.integers(len(VEHICLE_KINDS)))]
-    base: VehicleKind = kind
-    if kind in _STANDS_ON:
-        base = _STANDS_ON[kind][int(rng.integers(len(_STANDS_ON[kind])))]
-    wheels, always_bounded = _WHEELS[base](rng)
-    for i in range(int(rng.integers(3))):
-        x, y = _point(rng)
-        wheels.append({"id": f"castor-{i}", "type": "castor", "x": x, "y": y})
-    order = rng.permutation(len(wheels))
-    data: dict[str, Any] = {
-        "name": f"random-{kind}",
-        "wheels": [wheels[i] for i in order],
-        "limits": _random_limits(rng, always_bounded),
-    }
-    if rng.random() < 0.4:
-        data["reference_point"] = _point(rng, 0.3)
-    if rng.random() < 0.2:
-        data["kappa_g"] = float(rng.uniform(0.5, 8.0))
-    if base == "skid":
-        data["skid_steer"] = {"effective_track": float(rng.uniform(0.3, 2.0))}
-    if base == "synchro":
-        data["synchro"] = True
-    if kind == "loaded":
-        _add_load(rng, data)
-    if kind == "guaranteed" or (kind == "loaded" and rng.random() < 0.3):
-        _add_guarantee(rng, data)
-    _add_steering_accelerations(rng.spawn(1)[0], data)
-    return vehicle_from_data(data)
-
-
-def _add_steering_accelerations(rng: np.random.Generator, data: dict[str, Any]) -> None:
-    """Limit how fast some vehicles may change their steering rates."""
-    share = 0.7 if rng.random() < 0.25 else 0.0
-    for wheel in data["wheels"]:
-        if wheel["type"] in {"steered", "turntable"} and rng.random() < share:
-            swing = float(10.0 ** rng.uniform(1.5, 3.5))
-            wheel["max_steering_acceleration_deg"] = swing
-
-
-def _add_load(rng: np.random.Generator, data: dict[str, Any]) -> None:
-    """Put a load on the vehicle, with castors where the wheels do not carry it."""
-    for wheel in data["wheels"]:
-        wheel.pop("offset", None)  # it shrinks the polygon; `rigid_body` knows nothing
-    for i in range(int(rng.integers(3, 5)) if len(data["wheels"]) < 3 else 1):
-        x, y = _point(rng)
-        castor = {"id": f"carrier-{i}", "type": "castor", "x": x, "y": y}
-        data["wheels"].append(castor)
-    while True:
-        contacts = np.array([(w["x"], w["y"]) for w in data["wheels"]])
-        spread = np.linalg.svd(contacts - contacts.mean(axis=0), compute_uv=False)
-        if spread[-1] > 0.1:
-            break
-        x, y = _point(rng)
-        name = f"carrier-{len(contacts)}"
-        data["wheels"].append({"id": name, "type": "castor", "x": x, "y": y})
-    share = 0.95 * rng.dirichlet(np.ones(len(contacts))) + 0.05 / len(contacts)
-    x, y = (float(value) for value in share @ contacts)
-    height = float(10.0 ** rng.uniform(-1.5, 0.5))
-    data["load"] = {"center_of_gravity": [x, y, height]}
-    if rng.random() < 0.5:
-        data["load"]["tipping_factor"] = float(rng.uniform(1, 3))
-    if rng.random() < 0.5:
-        data["limits"]["max_lateral_acceleration"] = float(rng.uniform(0.2, 5.0))
-        data["limits"]["lateral_acceleration_at"] = "center_of_gravity"
-
-
-def _add_guarantee(rng: np.random.Generator, data: dict[str, Any]) -> None:
-    """Guarantee change rates, and give the wheels that steer a rate of their own."""
-    for wheel in data["wheels"]:
-        if wheel["type"] in {"steered", "turntable"} and rng.random() < 0.9:
-            wheel["max_steering_rate_deg"] = float(rng.uniform(40, 300))
-    rates = {
-        "kappa_rate": float(10.0 ** rng.uniform(-2, 0.3)),
-        "beta_rate_deg": float(10.0 ** rng.uniform(-1, 1.7)),
-    }
-    if any(wheel["type"] == "fixed" for wheel in data["wheels"]):
-        del rates["beta_rate_deg"]  # β is constant
-    if data.get("synchro"):
-        del rates["kappa_rate"]  # κ_n is 0
-    for key in rng.choice(
-        list(rates), int(rng.integers(1, len(rates) + 1)), replace=False
-    ):
-        data.setdefault("guaranteed", {})[str(key)] = rates[str(key)]
-
-
-def _point(rng: np.random.Generator, size: float = 1.0) -> tuple[float, float]:
+def random_point(rng: np.random.Generator, size: float = 1.0) -> tuple[float, float]:
+    """Return a point of a square about the origin, m."""
     x, y = rng.uniform(-size, size, 2)
     return float(x), float(y)
 
 
-def _speed(rng: np.random.Generator) -> float:
+def random_speed(rng: np.random.Generator) -> float:
+    """Return a speed of a wheel or a vehicle, m/s."""
     return float(rng.uniform(0.3, 3.0))
-
-
-def _random_limits(rng: np.random.Generator, optional: bool) -> dict[str, float]:
-    """Return limits; speed and yaw rate at least, unless they are `optional`."""
-
-    def chosen(share: float) -> bool:
-        return bool(rng.random() < share)
-
-    limits: dict[str, float] = {}
-    if not optional or chosen(0.4):
-        limits["max_speed"] = _speed(rng)
-    if chosen(0.3):
-        limits["max_reverse_speed"] = _speed(rng)
-    if not optional or chosen(0.3):
-        limits["max_yaw_rate_deg"] = float(rng.uniform(20, 300))
-    if chosen(0.3):
-        limits["max_lateral_acceleration"] = float(rng.uniform(0.2, 5.0))
-    return limits
 
 
 def _random_range(rng: np.random.Generator) -> tuple[float, float] | None:
@@ -200,10 +55,10 @@ def _steered(
     driven: bool,
     steering_range: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
-    x, y = _point(rng)
+    x, y = random_point(rng)
     wheel: dict[str, Any] = {"id": name, "type": "steered", "x": x, "y": y}
     if driven:
-        wheel["max_speed"] = _speed(rng)
+        wheel["max_speed"] = random_speed(rng)
     if steering_range is not None:
         wheel["steering_range_deg"] = steering_range
     return wheel
@@ -240,7 +95,7 @@ def _axle(
 ) -> tuple[list[dict[str, Any]], float, complex]:
     """Two fixed wheels on one axle line, rotated and off the origin at times."""
     heading = float(rng.uniform(-180, 180)) if rng.random() < 0.5 else 0.0
-    middle = complex(*_point(rng, 0.5)) if rng.random() < 0.5 else 0j
+    middle = complex(*random_point(rng, 0.5)) if rng.random() < 0.5 else 0j
     along = complex(0, 1) * complex(
         math.cos(math.radians(heading)), math.sin(math.radians(heading))
     )
@@ -256,7 +111,7 @@ def _axle(
             "heading_deg": heading + turned,
         }
         if not passive:
-            wheel["max_speed"] = _speed(rng)
+            wheel["max_speed"] = random_speed(rng)
         wheels.append(wheel)
     return wheels, heading, middle
 
@@ -300,7 +155,7 @@ def _mecanum_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], boo
                     "y": float(sy * y),
                     "heading_deg": turned,
                     "roller_deg": -gamma * sx * sy,
-                    "max_speed": _speed(rng),
+                    "max_speed": random_speed(rng),
                 }
             )
     return wheels, True
@@ -320,7 +175,7 @@ def _omni_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
                 "x": r * math.cos(math.radians(angle)),
                 "y": r * math.sin(math.radians(angle)),
                 "heading_deg": angle + 90,
-                "max_speed": _speed(rng),
+                "max_speed": random_speed(rng),
             }
         )
     return wheels, True
@@ -368,8 +223,8 @@ def _skid_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
     """Two sides of two or three fixed wheels."""
     heading = float(rng.uniform(-180, 180)) if rng.random() < 0.5 else 0.0
     turn = complex(math.cos(math.radians(heading)), math.sin(math.radians(heading)))
-    middle, half = complex(*_point(rng, 0.5)), float(rng.uniform(0.1, 0.6))
-    speed = _speed(rng)
+    middle, half = complex(*random_point(rng, 0.5)), float(rng.uniform(0.1, 0.6))
+    speed = random_speed(rng)
     wheels = []
     for side in (1, -1):
         for i in range(int(rng.integers(2, 4))):
@@ -382,7 +237,7 @@ def _skid_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], bool]:
                     "x": place.real,
                     "y": place.imag,
                     "heading_deg": heading + turned,
-                    "max_speed": speed if rng.random() < 0.7 else _speed(rng),
+                    "max_speed": speed if rng.random() < 0.7 else random_speed(rng),
                 }
             )
     return wheels, True
@@ -397,7 +252,7 @@ def _synchro_wheels(rng: np.random.Generator) -> tuple[list[dict[str, Any]], boo
     return wheels, True
 
 
-_WHEELS: dict[
+WHEELS: dict[
     str, Callable[[np.random.Generator], tuple[list[dict[str, Any]], bool]]
 ] = {
     "steered": _steered_wheels,
@@ -411,8 +266,4 @@ _WHEELS: dict[
     "skid": _skid_wheels,
     "synchro": _synchro_wheels,
 }
-
-_STANDS_ON: dict[VehicleKind, tuple[VehicleKind, ...]] = {
-    "loaded": (*VEHICLE_KINDS, "offset", "turntable", "skid"),
-    "guaranteed": ("steered", "mixed", "ackermann", "offset", "turntable"),
-}
+"""From a kind to what draws its wheels, and whether all are driven alike."""
