@@ -12,6 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from typing import TypeAlias
 
 from omniplan.shell import (
     answers,
@@ -25,6 +26,9 @@ from omniplan.shell import (
 from omniplan.shell.answers import FAILURE
 
 __all__ = ["main"]
+
+Run: TypeAlias = Callable[[argparse.Namespace], int]
+AddArguments: TypeAlias = Callable[[argparse.ArgumentParser], None]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,47 +73,69 @@ def _parser() -> argparse.ArgumentParser:
         "--version", action="version", version=f"omniplan {version('omniplan')}"
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
-    def command(
-        name: str, run: Callable[[argparse.Namespace], int], text: str
-    ) -> argparse.ArgumentParser:
-        sub = commands.add_parser(name, help=text, description=text)
-        sub.add_argument("--json", action="store_true", help="print JSON")
-        sub.set_defaults(run=run)
-        return sub
-
-    looking.add_demo_arguments(
-        command(
-            "demo", looking.demo, "judge a mixed fleet over a real zenoh connection"
-        )
-    )
-    looking.add_inspect_arguments(
-        command("inspect", looking.inspect, "show what a vehicle can do")
-    )
-    checking.add_arguments(
-        command("check", checking.check, "judge trajectories for one vehicle or many")
-    )
-    selecting.add_arguments(
-        command("select", selecting.select, "rank the vehicles of a fleet")
-    )
-    planning.add_arguments(
-        command("plan", planning.plan, "find a trajectory among obstacles")
-    )
-    serving.add_arguments(
-        command("serve", serving.serve, "answer questions about a fleet over zenoh")
-    )
-    asking.add_arguments(command("query", asking.query, "ask a server"))
-    looking.add_export_arguments(
-        command("export", looking.export, "write a vehicle's data sheet or its solid")
-    )
-    looking.add_schema_arguments(
-        command("schema", looking.schema, "print a JSON Schema")
-    )
-    looking.add_bench_arguments(
-        command("bench", looking.bench, "measure batches on this machine")
-    )
-    command("catalog", looking.catalog, "list the ready vehicles")
+    for name, run, add_arguments, text in _commands():
+        command = commands.add_parser(name, help=text, description=text)
+        command.add_argument("--json", action="store_true", help="print JSON")
+        command.set_defaults(run=run)
+        add_arguments(command)
     return parser
+
+
+def _commands() -> tuple[tuple[str, Run, AddArguments, str], ...]:
+    """Return the name of every command, what it does and takes, and its help."""
+    return (
+        (
+            "demo",
+            looking.demo,
+            looking.add_demo_arguments,
+            "judge a mixed fleet over a real zenoh connection",
+        ),
+        (
+            "inspect",
+            looking.inspect,
+            looking.add_inspect_arguments,
+            "show what a vehicle can do",
+        ),
+        (
+            "check",
+            checking.check,
+            checking.add_arguments,
+            "judge trajectories for one vehicle or for many",
+        ),
+        (
+            "select",
+            selecting.select,
+            selecting.add_arguments,
+            "rank the vehicles of a fleet",
+        ),
+        (
+            "plan",
+            planning.plan,
+            planning.add_arguments,
+            "find a trajectory among obstacles",
+        ),
+        (
+            "serve",
+            serving.serve,
+            serving.add_arguments,
+            "answer questions about a fleet over zenoh",
+        ),
+        ("query", asking.query, asking.add_arguments, "ask a server"),
+        (
+            "export",
+            looking.export,
+            looking.add_export_arguments,
+            "write a vehicle's data sheet or its solid",
+        ),
+        ("schema", looking.schema, looking.add_schema_arguments, "print a JSON Schema"),
+        (
+            "bench",
+            looking.bench,
+            looking.add_bench_arguments,
+            "measure batches on this machine",
+        ),
+        ("catalog", looking.catalog, lambda _: None, "list the ready vehicles"),
+    )
 
 
 if __name__ == "__main__":

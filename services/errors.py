@@ -42,7 +42,7 @@ CODES: Mapping[str, str] = MappingProxyType(
         "busy": "the queue is full; ask again later",
         "cancelled": "the caller has cancelled the request",
         "closing": "the server is about to stop; ask again later or elsewhere",
-        "conflict": "the vehicle is of another version than the one expected",
+        "conflict": "the vehicle is of another version than expected, or changed since",
         "deadline_exceeded": "the time for the request is over; nothing more comes",
         "internal": "the server failed; its log says why",
         "invalid_input": "a value is outside what is allowed",

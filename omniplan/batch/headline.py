@@ -28,6 +28,7 @@ from omniplan.batch.kinds import (
 from omniplan.batch.motions import LANES, enclose
 from omniplan.batch.refine import (
     KEPT,
+    NO,
     STACK,
     YES,
     largest,
@@ -35,6 +36,7 @@ from omniplan.batch.refine import (
     one_row,
     swing_halves,
 )
+from omniplan.batch.rows import SETTLING
 from omniplan.batch.swings import is_wide, load_swings
 from omniplan.judging.violations import FINEST
 from omniplan.report import SHAPE_LIMITS, TIE
@@ -168,7 +170,7 @@ def _at_samples(
     error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
     floor, others = max(KEPT, floor), 0.0
     for b in range(count):
-        bound = skipped[r * count + b]
+        bound = skipped[r, b]
         most = bound if bound >= 0.0 else largest(highs, (r * count + b) * LANES)
         if not plain[b]:
             others = max(others, most)
@@ -178,7 +180,7 @@ def _at_samples(
         load(blocks, b, s)
         if wide:
             load_swings(blocks, b, s)
-        one_row(s, rows, r, vehicle, tolerances, YES)
+        one_row(s, rows, r, vehicle, tolerances, SETTLING)
         best = _keep_largest(s, knot_of, b, begin, end, best, place)
     # What the intervals of other blocks reach, their parts do not exceed.
     is_less = others + error <= max(floor, best * (1 - TIE))
@@ -186,9 +188,68 @@ def _at_samples(
         load(wholes, b, s)
         if wide:
             load_swings(wholes, b, s)
-        one_row(s, rows, r, vehicle, tolerances, YES)
+        one_row(s, rows, r, vehicle, tolerances, SETTLING)
         best = _keep_largest(s, whole_knot, b, begin, end, best, place)
     return best
+
+
+@kernel()
+def _has_broken(
+    s: Array, rows: Array, r: int, vehicle: Array, tolerances: Array, begin: float,
+    end: float,
+) -> bool:  # fmt: skip
+    """Return whether a row is broken at a sample of some interval of a block.
+
+    Arc tangents are needed only where the quick ones leave that open.
+    """
+    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    one_row(s, rows, r, vehicle, tolerances, NO)
+    is_open = False
+    for k in range(LANES):
+        middle = (s[START + k] + s[END + k]) / 2
+        if begin < middle < end and s[LOW + k] + error > KEPT:
+            if s[LOW + k] - error > KEPT:
+                return True
+            is_open = True
+    if not is_open:
+        return False
+    one_row(s, rows, r, vehicle, tolerances, SETTLING)
+    for k in range(LANES):
+        middle = (s[START + k] + s[END + k]) / 2
+        if begin < middle < end and s[LOW + k] > KEPT:
+            return True
+    return False
+
+
+@kernel()
+def _breaks(
+    blocks: Array, plain: Array, wholes: Array, rows: Array, r: int, vehicle: Array,
+    tolerances: Array, s: Array, highs: Array, skipped: Array, begin: float, end: float,
+) -> bool:  # fmt: skip
+    """Return whether `_at_samples` finds a row broken, without how much it is."""
+    count, wide = blocks.shape[0], is_wide(rows[r, KIND])
+    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    others = 0.0
+    for b in range(count):
+        bound = skipped[r, b]
+        most = bound if bound >= 0.0 else largest(highs, (r * count + b) * LANES)
+        if not plain[b]:
+            others = max(others, most)
+            continue
+        if most + error <= KEPT:
+            continue
+        load(blocks, b, s)
+        if wide:
+            load_swings(blocks, b, s)
+        if _has_broken(s, rows, r, vehicle, tolerances, begin, end):
+            return True
+    for b in range(0 if others + error <= KEPT else wholes.shape[0]):
+        load(wholes, b, s)
+        if wide:
+            load_swings(wholes, b, s)
+        if _has_broken(s, rows, r, vehicle, tolerances, begin, end):
+            return True
+    return False
 
 
 @kernel()
@@ -206,16 +267,16 @@ def _window(blocks: Array, ends: Array, pieces: int, p: int) -> tuple[float, flo
 
 @kernel()
 def count_faults(
-    blocks: Array, knot_of: Array, samples: tuple[Array, ...], rows: Array,
-    vehicle: Array, tolerances: Array, s: Array, highs: Array, skipped: Array,
-    high: Array, spot: Array, ends: Array, pieces: int, by_piece: Array,
+    blocks: Array, samples: tuple[Array, ...], rows: Array, vehicle: Array,
+    tolerances: Array, s: Array, highs: Array, skipped: Array, high: Array, ends: Array,
+    pieces: int, by_piece: Array,
 ) -> None:  # fmt: skip
     """Count the limits that pieces break at the samples, as `standstill` does.
 
     Only where both representations break some: the first column of `by_piece`. Limits
     that hold for both count for neither.
     """
-    plain, wholes, whole_knot, _ = samples
+    plain, wholes, _, _ = samples
     for p in range(pieces):
         if by_piece[p, 0, 0] == 0.0 or by_piece[p, 1, 0] == 0.0:
             continue
@@ -227,13 +288,15 @@ def count_faults(
             sign = rows[r, SIGN]
             if high[r] + error <= KEPT or (sign == 0 and common):
                 continue
-            best = _at_samples(
-                blocks, knot_of, plain, wholes, whole_knot, rows, r, vehicle,
-                tolerances, s, highs, skipped, begin, end, 0.0, 0.0, spot,
-            )  # fmt: skip
-            if best > KEPT and sign != 0:
+            if not _breaks(
+                blocks, plain, wholes, rows, r, vehicle, tolerances, s, highs, skipped,
+                begin, end,
+            ):  # fmt: skip
+                continue
+            if sign != 0:
                 by_piece[p, 0 if sign > 0 else 1, 0] += 1.0
-            common |= best > KEPT and sign == 0
+            else:
+                common = True
         for side in range(2):
             if by_piece[p, side, 0] == 0.0 and not common:
                 by_piece[p, side, 0] = BETWEEN

@@ -23,18 +23,18 @@ import pyarrow as pa
 
 from configspace import InvalidInput, PermissibleSpace, Problem
 from configspace.space import require_space
-from omniplan.batch.coarse import groups_of
 from omniplan.batch.fleet import Fleet, fleet_of, is_connected, is_plain
+from omniplan.batch.groups import groups_of
 from omniplan.batch.motions import Knots, knots_of, parts_of
 from omniplan.batch.reaches import codes_of
+from omniplan.batch.table import SCHEMA, UNKNOWN, Verdicts
 from omniplan.batch.twists import check_twists
-from omniplan.batch.verdicts import UNCLEAR, VALID, judge_pairs
+from omniplan.batch.verdicts import UNCLEAR, judge_pairs
 from omniplan.judging.rows import Tolerances
-from omniplan.report import Report
 from omniplan.trajectory import Trajectory
 from omniplan.validation import judged
 
-__all__ = ["Batch", "check_twists", "require_names", "validate_many"]
+__all__ = ["SCHEMA", "Batch", "check_twists", "require_names", "validate_many"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -48,29 +48,9 @@ SAMPLES = 1 << 15
 """... and into more where one would have more samples than this."""
 AHEAD = 2
 """Tasks per thread that may be under way."""
-UNKNOWN = -1
-"""Instead of a label: nothing refuses the pair, and nothing limits it."""
 KERNEL_FORMS = ("poses", "twists")
 
 _LOG = logging.getLogger(__name__)
-
-_TEXT = pa.dictionary(pa.int32(), pa.string())
-SCHEMA = pa.schema(
-    [
-        pa.field("trajectory", _TEXT, nullable=False),
-        pa.field("vehicle", _TEXT, nullable=False),
-        pa.field("valid", pa.bool_(), nullable=False),
-        pa.field("margin", pa.float64(), nullable=False),
-        pa.field("duration", pa.float64(), nullable=False),
-        pa.field("limit", _TEXT),
-        pa.field("wheel", _TEXT),
-        pa.field("t", pa.float64()),
-        pa.field("value", pa.float64()),
-        pa.field("bound", pa.float64()),
-        pa.field("unit", _TEXT),
-        pa.field("u", pa.float64()),
-    ]
-)
 
 
 def validate_many(
@@ -107,9 +87,7 @@ def validate_many(
             As ``validate(trajectory, space).valid``.
         ``margin``
             1 - the largest utilisation of any limit: of a valid pair never exceeded and
-            sharp to a thousandth as in a `Report`; of a refused one, reached. Where a
-            standstill sets it, the time there is counts from where the vehicle surely
-            stands, which may be some hundredths of a second less than in a `Report`.
+            sharp to a thousandth as in a `Report`; of a refused one, reached.
         ``duration``
             s.
         ``limit``, ``wheel``
@@ -118,7 +96,8 @@ def validate_many(
         ``t``, ``value``, ``bound``, ``unit``
             Of a refused pair the sample, s, at which the limit is broken most, and by
             how much. The headline of a `Report` may have a worse place between two
-            samples in the same stretch.
+            samples in the same stretch. Where nothing is broken at a sample: the same
+            with the intervals between the samples halved evenly until something is.
         ``u``
             How far along a path the limit is met, m (`Path.parameter`), where rows are
             of paths (`PathBatch`) and the path has no timing; otherwise null.
@@ -229,7 +208,7 @@ class Batch:
         Yields after every pair that `validate` was asked for, so that other work can
         have its turn.
         """
-        found = _Verdicts.empty(len(chunk), len(self.spaces))
+        found = Verdicts.empty(len(chunk), len(self.spaces))
         rows = [i for i, x in enumerate(chunk) if x.form in KERNEL_FORMS]
         if rows and self._plain:
             fleet, kind = self._types
@@ -249,7 +228,7 @@ class Batch:
             [space.name for space in self.spaces],
         )
 
-    def _run_owners(self, chunk: Sequence[Trajectory], found: _Verdicts) -> None:
+    def _run_owners(self, chunk: Sequence[Trajectory], found: Verdicts) -> None:
         """Judge Omni-Curve-Parameters for their own vehicles by the kernels."""
         by_owner: dict[int, list[int]] = {}
         for i, trajectory in enumerate(chunk):
@@ -274,7 +253,7 @@ class Batch:
         self,
         trajectories: Sequence[Trajectory],
         fleet: Fleet,
-        found: _Verdicts,
+        found: Verdicts,
         at: tuple[Any, ...],
         kind: IntArray,
         *,
@@ -329,84 +308,6 @@ class Batch:
         found.label[at] = label[:, kind]
 
 
-@dataclass(eq=False)
-class _Verdicts:
-    """The verdicts on a chunk, (n, m) each."""
-
-    status: npt.NDArray[np.uint8]
-    margin: FloatArray
-    t: FloatArray
-    value: FloatArray
-    bound: FloatArray
-    label: npt.NDArray[np.int32]
-    labels: dict[tuple[str, Name, Name], int] = field(default_factory=dict)
-    """Limit, wheel and unit by their number."""
-
-    @classmethod
-    def empty(cls, n: int, m: int) -> _Verdicts:
-        margin, t, value, bound = np.full((4, n, m), np.nan)
-        status = np.full((n, m), UNCLEAR, np.uint8)
-        label = np.full((n, m), UNKNOWN, np.int32)
-        return cls(status, margin, t, value, bound, label)
-
-    def code(self, fleet: Fleet) -> npt.NDArray[np.int32]:
-        """Return the numbers of all that a fleet tells."""
-        return np.array(
-            [
-                self._number(label.limit, label.wheel or None, label.unit)
-                for label in fleet.told
-            ],
-            dtype=np.int32,
-        )
-
-    def _number(self, limit: str, wheel: Name, unit: Name) -> int:
-        return self.labels.setdefault((limit, wheel, unit), len(self.labels))
-
-    def take(self, i: int, j: int, report: Report) -> None:
-        """Take over the report of `validate` on one pair."""
-        self.status[i, j] = VALID if report.valid else VALID + 1
-        self.margin[i, j] = report.margin
-        told = report.headline
-        if told is None:
-            limit, _, wheel = report.tightest.partition(" ")
-            if limit != "nothing":
-                self.label[i, j] = self._number(limit, wheel or None, None)
-            return
-        self.label[i, j] = self._number(told.limit, told.wheel, told.unit)
-        self.t[i, j], self.bound[i, j] = told.t, told.bound
-        self.value[i, j] = math.nan if told.value is None else told.value
-
-    def to_batch(
-        self, trajectories: list[str], durations: list[float], vehicles: list[str]
-    ) -> pa.RecordBatch:
-        n, m = self.status.shape
-        valid = (self.status == VALID).ravel()
-        label = self.label.ravel()
-        texts = list(zip(*self.labels, strict=True)) or [(), (), ()]
-        limit, wheel, unit = (
-            _coded(label, values, hide=hide)
-            for values, hide in zip(texts, (None, None, valid), strict=True)
-        )
-        return pa.record_batch(
-            [
-                _named(np.repeat(np.arange(n, dtype=np.int32), m), trajectories),
-                _named(np.tile(np.arange(m, dtype=np.int32), n), vehicles),
-                pa.array(valid),
-                pa.array(self.margin.ravel()),
-                pa.array(np.repeat(durations, m)),
-                limit,
-                wheel,
-                *(
-                    pa.array(x.ravel(), mask=valid | np.isnan(x.ravel()))
-                    for x in (self.t, self.value, self.bound)
-                ),
-                unit,
-                pa.nulls(label.size, pa.float64()),
-            ],
-            schema=SCHEMA,
-        )
-
-
 def _slices(trajectories: Sequence[Trajectory]) -> Iterator[slice]:
     """Yield runs of trajectories that are judged together."""
     most = -(-len(trajectories) // SLICES)
@@ -430,27 +331,6 @@ def _whole(turns: Generator[None, None, pa.RecordBatch]) -> pa.RecordBatch:
             return rows
 
 
-def _named(index: npt.NDArray[np.int32], names: list[str]) -> Any:
-    return pa.DictionaryArray.from_arrays(index, pa.array(names, pa.string()))
-
-
-def _coded(
-    label: npt.NDArray[np.int32],
-    values: Sequence[Name],
-    hide: npt.NDArray[np.bool_] | None,
-) -> Any:
-    """Return texts by their numbers; null for no number, no text, or what is hidden."""
-    texts = sorted({value for value in values if value is not None})
-    code = {text: i for i, text in enumerate(texts)}
-    table = np.array([code.get(v, -1) if v else -1 for v in values] + [-1], np.int32)
-    index = table[label]  # no label is the last entry
-    missing = index < 0 if hide is None else (index < 0) | hide
-    return pa.DictionaryArray.from_arrays(
-        pa.array(np.maximum(index, 0), pa.int32(), mask=missing),
-        pa.array(texts, pa.string()),
-    )
-
-
 def _name(trajectory: object) -> str:
     if not isinstance(trajectory, Trajectory):
         raise InvalidInput(
@@ -470,7 +350,11 @@ def require_names(what: str, names: Sequence[str]) -> None:
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InvalidInput(
-            Problem(what, f"{repeated[0]} more than once", "names must differ")
+            Problem(
+                what,
+                f'the name "{repeated[0]}" more than once',
+                "names that differ; give each its own, as by name=...",
+            )
         )
 
 

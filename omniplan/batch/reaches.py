@@ -18,9 +18,12 @@ from scipy import ndimage
 from configspace import PermissibleSpace
 from configspace.kernels import BLOCKED, FREE
 from omniplan.batch.kernel import kernel
+from omniplan.batch.kinds import SIGN
 from omniplan.batch.motions import LANES
+from omniplan.batch.refine import KEPT
+from omniplan.standing.standstill import UNREACHABLE
 
-__all__ = ["LOST", "REACHED", "UNSURE", "codes_of", "component_of"]
+__all__ = ["LOST", "REACHED", "UNSURE", "codes_of", "component_of", "mark_lost"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
 
@@ -119,3 +122,31 @@ def component_of(
     if is_lost:
         return LOST
     return REACHED if is_clear else UNSURE
+
+
+@kernel()
+def mark_lost(
+    blocks: Array, knot_of: Array, knots: Array, rows: Array, cells: Array,
+    vehicle: Array, ends: Array, pieces: int, low: Array, by_piece: Array,
+) -> bool:  # fmt: skip
+    """Mark pieces in another component of the space, as `choose_configurations` does.
+
+    Among the representations worth a look; False if some of that is not known.
+    """
+    broken = False
+    for r in range(rows.shape[0]):
+        broken |= rows[r, SIGN] == 0 and low[r] > KEPT
+    for p in range(pieces):
+        least = min(by_piece[p, 0, 0], by_piece[p, 1, 0])
+        for side in range(2):
+            if by_piece[p, side, 0] > least:
+                continue
+            told = component_of(
+                blocks, knot_of, knots, ends[p, 0], ends[p, 1], 1.0 - 2.0 * side, cells,
+                vehicle,
+            )  # fmt: skip
+            if told == LOST and not broken and least == 0:
+                by_piece[p, side, 0] = UNREACHABLE
+            elif told != REACHED:
+                return False
+    return True

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from omniplan.batch.chords import HIGH, LOW, SWUNG
-from omniplan.batch.coarse import PER_BLOCK, screen
+from omniplan.batch.coarse import screen
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import BOUND, KIND, RANGE, RANGE_ERROR, SIGN
 from omniplan.batch.motions import FIELDS, LANES, enclose
-from omniplan.batch.rows import evaluate
+from omniplan.batch.rows import SETTLING, evaluate
 from omniplan.batch.swings import is_swinging, is_wide, load_swings, swing_into
 from omniplan.judging.proof import RESOLUTION, ROUNDING, SHARPNESS
+from omniplan.report import SHAPE_LIMITS
 
 __all__ = [
     "HALVES",
@@ -48,14 +49,20 @@ EVALUATED = -1.0
 """Instead of the bound of a group: the parts were evaluated one by one."""
 KEPT = 1 + ROUNDING
 """The largest utilisation that keeps a limit."""
+CLASSES = len(SHAPE_LIMITS)
+"""Number of the last class of rows: those that driving slower mends."""
+NEARLY = 0.9
+"""Rows that may reach this share of the largest bound are looked at first."""
+UNSEEN, SEEN, BROKEN = 0.0, 1.0, 2.0
+"""Of rows: evaluated nowhere, somewhere, or of one representation and broken there."""
 
 
 @kernel()
 def load(blocks: Array, b: int, s: Array) -> None:
     """Copy the enclosures of a block into the scratch array."""
-    block = blocks.reshape(blocks.shape[0], -1)[b]
+    flat, at = blocks.flat, b * blocks.shape[1] * LANES
     for k in range(FIELDS * LANES):  # one loop is vector code, two are not
-        s[k] = block[k]
+        s[k] = flat[at + k]
 
 
 @kernel()
@@ -72,95 +79,94 @@ def largest(values: Array, at: int) -> float:
 
 
 @kernel()
-def _first_block(tops: Array, rows: Array, blocks: int, most: Array) -> int:
-    """Return the block in which most may be reached; `most` is scratch."""
-    groups = tops.shape[1]
-    for g in range(groups):
-        most[g] = -1.0
-    for r in range(rows.shape[0]):
-        if rows[r, SIGN] != 0:
-            continue
-        for g in range(groups):
-            top = tops[r, g] if tops[r, g] < np.inf else -1.0
-            most[g] = top if top > most[g] else most[g]
-    at = 0
-    for g in range(1, PER_BLOCK * blocks):
-        at = g if most[g] > most[at] else at
-    return at // PER_BLOCK
+def _highest(crest: Array, blocks: int) -> tuple[int, float]:
+    """Return the block in which most may be reached, and how much, as far as known."""
+    start, most = 0, 0.0
+    for b in range(blocks):
+        if crest[b, 1] > most:
+            start, most = b, crest[b, 1]
+    return start, most
 
 
 @kernel()
 def _choose_rows(
-    tops: Array, b: int, blocks: int, worst: float, done: Array, wanted: Array,
-    skipped: Array, high: Array,
-) -> bool:  # fmt: skip
-    """Mark the rows that may exceed `worst` in a block; keep the bounds of the others.
+    rows: Array, order: Array, b: int, worst: float, state: Array, chosen: Array,
+    skipped: Array,
+) -> int:  # fmt: skip
+    """Choose the rows that are worth evaluating over a block; return how many.
 
-    Whatever may break its limit is marked, too, unless it is a row of one
-    representation that is broken already: `done`. Returns whether there is any.
+    Those that may exceed `worst`, and, unless driving slower mends it, those that may
+    break their limit: `headline` has to tell all of these. None of one representation
+    that is broken already.
     """
-    some = False
+    count = 0
     limit = worst if worst < KEPT else KEPT
-    for r in range(tops.shape[0]):
-        top = tops[r, PER_BLOCK * b]
-        for g in range(PER_BLOCK * b + 1, PER_BLOCK * (b + 1)):
-            top = tops[r, g] if tops[r, g] > top else top
-        far = (top > limit) & (done[r] == 0.0)
-        some |= far
-        wanted[r] = 1.0 if far else 0.0
-        skipped[r * blocks + b] = EVALUATED if far else top
-        rest = 0.0 if far else top
-        high[r] = rest if rest > high[r] else high[r]
-    return some
+    for r in range(rows.shape[0]):
+        top = skipped[r, b]
+        mends = (rows[r, SIGN] == 0) & (order[r, 0] == CLASSES)
+        far = (top > (worst if mends else limit)) & (state[r] < BROKEN)
+        skipped[r, b] = EVALUATED if far else top
+        chosen[count] = r
+        count += 1 if far else 0
+    return count
 
 
 @kernel(inline="always")
 def sweep(
-    blocks: Array, groups: Array, rows: Array, vehicle: Array, tolerances: Array,
-    s: Array, tops: Array, wanted: Array, done: Array, most: Array, highs: Array,
-    skipped: Array, low: Array, high: Array, at: Array,
+    blocks: Array, groups: Array, rows: Array, order: Array, vehicle: Array,
+    tolerances: Array, s: Array, crest: Array, chosen: Array, state: Array,
+    most: Array, highs: Array, skipped: Array, low: Array, high: Array,
 ) -> None:  # fmt: skip
     """Largest `LOW` and `HIGH` of every row over all parts.
 
     Where a row cannot reach more than some row that counts in any case does elsewhere,
-    nor its limit, the bound of its group has to do, which `skipped` gets. So it has
+    nor its limit, the bound of its block has to do, which `skipped` gets. So it has
     where a row of one representation is broken anyway: `low` is reached somewhere then,
-    but perhaps not the largest. `at` gets the block in which `low` is reached of a row
-    that counts in any case.
+    but perhaps not the largest.
     """
     n_rows, n_blocks = rows.shape[0], blocks.shape[0]
-    bounds = tops[:n_rows]
-    u = s.reshape(-1, LANES)
-    screen(groups, rows, vehicle, tolerances, u, bounds)
+    screen(groups, rows, vehicle, tolerances, skipped, crest)
+    start, top = _highest(crest, n_blocks)
     for r in range(n_rows):
-        low[r], high[r], at[r], done[r] = 0.0, 0.0, 0, 0.0
-    start = _first_block(bounds, rows, n_blocks, highs)
-    for k in range(2 * LANES * n_rows):
-        most[k] = 0.0
+        low[r], high[r], state[r] = 0.0, 0.0, UNSEEN
     worst, swings = 0.0, is_swinging(rows)
-    for i in range(n_blocks):
-        b = start if i == 0 else (i - 1 if i <= start else i)
-        if not _choose_rows(bounds, b, n_blocks, worst, done, wanted, skipped, high):
+    for i in range(n_blocks + 1):
+        # First what may be the worst of all: then little else is worth a look.
+        b, least = (start, NEARLY * top) if i == 0 else (i - 1, worst)
+        if crest[b, 0] <= least:
+            continue
+        count = _choose_rows(rows, order, b, least, state, chosen, skipped)
+        if count == 0:
             continue
         load(blocks, b, s)
         if swings:
             load_swings(blocks, b, s)
-        evaluate(s, rows, NO, n_rows, vehicle, tolerances, NO, wanted, most, highs, b,
+        for j in range(count):
+            r = int(chosen[j])
+            if state[r] == UNSEEN:
+                for k in range(2 * LANES):
+                    most[2 * LANES * r + k] = 0.0
+                state[r] = SEEN
+        evaluate(s, rows, NO, count, vehicle, tolerances, NO, chosen, most, highs, b,
             n_blocks,
         )  # fmt: skip
-        for r in range(n_rows):
-            if wanted[r] == 0.0:
-                continue
+        for j in range(count):
+            r = int(chosen[j])
             reached = largest(most, 2 * LANES * r)
             if rows[r, SIGN] == 0:
                 worst = reached if reached > worst else worst
             elif reached - RANGE_ERROR / rows[r, BOUND] > KEPT:
-                done[r] = 1.0
-            if reached > low[r]:
-                low[r], at[r] = reached, b
+                state[r] = BROKEN
+            low[r] = reached if reached > low[r] else low[r]
     for r in range(n_rows):
-        top = largest(most, 2 * LANES * r + LANES)
-        high[r] = top if top > high[r] else high[r]
+        most_left = 0.0
+        for b in range(n_blocks):
+            rest = skipped[r, b]
+            most_left = rest if rest > most_left else most_left
+        if state[r] != UNSEEN:
+            top = largest(most, 2 * LANES * r + LANES)
+            most_left = top if top > most_left else most_left
+        high[r] = most_left
 
 
 @kernel(inline="always")
@@ -232,8 +238,8 @@ def describe(
     times : two floats, s
     """
     view = s.reshape(-1, LANES)
-    for k in range(LANES):
-        t = times[0] if k == 0 else times[1]
+    for k in range(2):  # what is in the other lanes does not matter
+        t = times[k]
         enclose(knot, form, t, t, view, k)
         if is_wide(row[0, KIND]):
             swing_into(knot, form, t, t, view, SWUNG // LANES, k)
@@ -259,13 +265,12 @@ def refine(
     is_proof = threshold == KEPT
     low, high = 0.0, 0.0
     waiting = 0
-    view = s.reshape(-1, LANES)
     # What `sweep` found on every part.
     parts = r * blocks.shape[0] * LANES
     error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
     for b in range(first // LANES, (last - 1) // LANES + 1):
         at = parts + b * LANES
-        bound = skipped[r * blocks.shape[0] + b]
+        bound = skipped[r, b]
         most = bound if bound >= 0.0 else largest(highs, at)
         if most + error <= threshold and not reaching:
             high = most if most > high else high
@@ -278,7 +283,7 @@ def refine(
             if bound >= 0.0:
                 for k in range(LANES):
                     highs[at + k] = s[HIGH + k]
-                skipped[r * blocks.shape[0] + b] = EVALUATED
+                skipped[r, b] = EVALUATED
         else:
             for k in range(LANES):
                 s[LOW + k] = 0.0
@@ -302,6 +307,10 @@ def refine(
                 waiting += 1
             else:
                 high = np.inf
+    if waiting == 0:
+        high = max(high, low)
+        return low, high, not is_proof or low > KEPT or high <= KEPT
+    view = s.reshape(-1, LANES)
     halved, those = stack[STACK:], knot_at[STACK:]
     while waiting > 0:
         if is_proof and (low > KEPT or high > KEPT):
@@ -320,7 +329,7 @@ def refine(
             )  # fmt: skip
         if is_wide(rows[r, KIND]):
             swing_halves(knots, form, those, view, taken, s)
-        one_row(s, rows, r, vehicle, tolerances, YES if is_proof else NO)
+        one_row(s, rows, r, vehicle, tolerances, SETTLING if is_proof else NO)
         off = 0.0 if is_proof else error  # of the quick arc cosine
         waiting = base
         for k in range(2 * taken):

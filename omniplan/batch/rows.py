@@ -8,9 +8,12 @@ against `VehicleJudge.utilisation` in the tests.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from omniplan.batch import rolling, steering
+import numpy as np
+
+from omniplan.batch import beside, rolling, steering
 from omniplan.batch.chords import HIGH, LOW, STANDS, body, change, chord, ends, reach
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import (
@@ -46,9 +49,15 @@ from omniplan.batch.kinds import (
 )
 from omniplan.batch.motions import LANES
 
-__all__ = ["evaluate"]
+__all__ = ["SETTLING", "evaluate"]
 
 Array = Any  # numba infers the types; mypy cannot look into the kernels
+
+OF_BODY = (SLIP, PARALLEL, BESIDE_GROWTH)
+"""Kinds of rows that depend on the speed of the body, besides those about the
+configuration."""
+SETTLING = np.int64(2)
+"""How exact angles are: see `evaluate`."""
 
 
 @kernel()
@@ -81,7 +90,7 @@ def _gather(s: Array, is_free: float, most: Array, highs: Array) -> None:
 @kernel()
 def evaluate(
     s: Array, rows: Array, first: int, last: int, vehicle: Array, tolerances: Array,
-    exact: int, wanted: Array, most: Array, highs: Array, block: int, blocks: int,
+    exact: int, chosen: Array, most: Array, highs: Array, block: int, blocks: int,
 ) -> None:  # fmt: skip
     """Write what rows first to last - 1 say of a block to its fields `LOW` and `HIGH`.
 
@@ -97,10 +106,11 @@ def evaluate(
         K in m, κ_g in 1/m.
     tolerances : (3,) float
         Standstill in m/s, sine of the slip angle, slip speed in m/s.
-    exact : {0, 1}
-        Whether angles are needed to the last digit.
-    wanted : (r,) float
-        Rows with a 0 are left out, unless `blocks` is 0.
+    exact : {0, 1, SETTLING}
+        Whether angles are needed to the last digit: nowhere, everywhere, or only where
+        a range may be left.
+    chosen : (r,) float
+        Which rows are meant by first to last - 1, unless `blocks` is 0.
     most : (r * 2 LANES,) float
         Gets the largest `LOW` and `HIGH` so far of every row, lane by lane.
     highs : (r * blocks * LANES,) float
@@ -108,17 +118,21 @@ def evaluate(
     block, blocks : int
         Which of how many blocks this is; of 0 nothing is kept.
     """
-    body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
     at_x, at_y = vehicle[0], vehicle[1]
-    has_ends, has_chord, has_change, has_reach = True, True, False, False
-    for r in range(first, last):
-        if blocks > 0 and wanted[r] == 0.0:
-            continue
+    has_body, has_ends, has_chord = False, False, False
+    has_change, has_reach = False, False
+    for i in range(first, last):
+        r = int(chosen[i]) if blocks > 0 else i
+        kind, bound = int(rows[r, KIND]), rows[r, BOUND]
+        if not has_body and (rows[r, FREE] > 0.0 or kind in OF_BODY):
+            body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
+            at_x, at_y = vehicle[0], vehicle[1]
+            has_body, has_ends, has_chord = True, True, True
+            has_change, has_reach = False, False
         x, y = rows[r, AT], rows[r, AT + 1]
         if x != at_x or y != at_y:
             at_x, at_y = x, y
             has_ends, has_chord, has_change, has_reach = False, False, False, False
-        kind, bound = int(rows[r, KIND]), rows[r, BOUND]
         a, b, angle = rows[r, ALONG], rows[r, ALONG + 1], rows[r, ANGLE]
         light = kind in (COMPONENT, COMPONENT_GROWTH, SLIP)
         if not light and not has_chord:
@@ -139,8 +153,10 @@ def evaluate(
         if kind == SINGULAR:
             steering.singular(s)
         elif kind == RANGE:
-            if exact:
-                steering.exact_range(s, rows[r, SIGN], angle, bound)
+            if exact == SETTLING:
+                steering.open_range(s, rows[r, SIGN], a, b, angle, bound)
+            elif exact:
+                steering.exact_range(s, rows[r, SIGN], angle, bound, -math.inf)
             else:
                 steering.quick_range(s, rows[r, SIGN], a, b, bound)
         elif kind == RATE:
@@ -166,19 +182,19 @@ def evaluate(
         elif kind == BESIDE:
             steering.rate(s, x, y, 1.0)
             sign = 1.0 if rows[r, SIGN] >= 0.0 else -1.0
-            steering.beside(s, rows[r, OFFSET], rows[r, COUPLING], sign, bound)
+            beside.beside(s, rows[r, OFFSET], rows[r, COUPLING], sign, bound)
         elif kind == ZONE:
             steering.zone(s, rows[r], vehicle)
         elif kind == SWING:
-            steering.swinging(s, x, y, bound)
+            beside.swinging(s, x, y, bound)
         elif kind == BESIDE_GROWTH:
             rolling.growth(s, 0.0, bound)
             sign = 1.0 if rows[r, SIGN] >= 0.0 else -1.0
-            steering.beside_growth(
+            beside.beside_growth(
                 s, x, y, rows[r, OFFSET], rows[r, COUPLING], sign, bound
             )
         elif kind == OWN_RANGE:
-            steering.exact_range(s, 1.0, angle, bound)
+            steering.exact_range(s, 1.0, angle, bound, -math.inf)
         elif kind == STEERING:
             steering.rate(s, x, y, 1.0)
             steering.steering(s, rows[r, OFFSET], bound)

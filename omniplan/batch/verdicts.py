@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from omniplan.batch.chords import LOW, NA, ROOM
+from omniplan.batch.groups import PER_ROW
 from omniplan.batch.headline import FINEST, count_faults, headline, is_driven, told
 from omniplan.batch.kernel import kernel
 from omniplan.batch.kinds import (
@@ -32,8 +33,17 @@ from omniplan.batch.kinds import (
 )
 from omniplan.batch.motions import FIELDS, LANES
 from omniplan.batch.pieces import MAX_PIECES, angle_of, choose, pieces_of
-from omniplan.batch.reaches import LOST, REACHED, component_of
-from omniplan.batch.refine import HALVES, KEPT, NO, STACK, YES, describe, refine, sweep
+from omniplan.batch.reaches import mark_lost
+from omniplan.batch.refine import (
+    HALVES,
+    KEPT,
+    NO,
+    STACK,
+    YES,
+    describe,
+    refine,
+    sweep,
+)
 from omniplan.batch.rests import CHANGES
 from omniplan.batch.swings import is_swinging, widened
 from omniplan.judging.proof import MAX_HALVINGS, SHARPENING_HALVINGS, SHARPNESS
@@ -155,8 +165,8 @@ def _judge(
     `out` gets the margin, then time, value and bound of the row that refuses.
     """
     (
-        s, tops, wanted, done, most, highs, skipped, halves, low, high, at, place,
-        stack, knot_at, ends, by_piece, signs, changes,
+        s, crest, chosen, state, most, highs, skipped, halves, low, high, place, stack,
+        knot_at, ends, by_piece, signs, changes,
     ) = room  # fmt: skip
     n_rows = rows.shape[0]
     pieces = 1
@@ -168,8 +178,8 @@ def _judge(
         if pieces < 0:
             return UNCLEAR, -1
     sweep(
-        blocks, groups, rows, vehicle, tolerances, s, tops, wanted, done, most, highs,
-        skipped, low, high, at,
+        blocks, groups, rows, order, vehicle, tolerances, s, crest, chosen, state, most,
+        highs, skipped, low, high,
     )  # fmt: skip
     for r in range(n_rows):
         place[r, 0] = -1.0
@@ -180,10 +190,10 @@ def _judge(
         return UNCLEAR, -1
     if vehicle[3] > 0:
         count_faults(
-            blocks, knot_of, samples, rows, vehicle, tolerances, s, highs, skipped,
-            high, place[n_rows], ends, pieces, by_piece,
+            blocks, samples, rows, vehicle, tolerances, s, highs, skipped, high, ends,
+            pieces, by_piece,
         )  # fmt: skip
-    if vehicle[7] > 0 and not _components(
+    if vehicle[7] > 0 and not mark_lost(
         blocks, knot_of, knots, rows, cells, vehicle, ends, pieces, low, by_piece
     ):
         return UNCLEAR, -1
@@ -233,34 +243,6 @@ def _judge(
         told: tuple[int, int] = _too_short(rows, order, change, used, which, out)
         return told
     return (VALID if is_valid else REFUSED), which
-
-
-@kernel()
-def _components(
-    blocks: Array, knot_of: Array, knots: Array, rows: Array, cells: Array,
-    vehicle: Array, ends: Array, pieces: int, low: Array, by_piece: Array,
-) -> bool:  # fmt: skip
-    """Count pieces in another component of the space, as `choose_configurations` does.
-
-    Among the representations worth a look; False if some of that is not known.
-    """
-    broken = False
-    for r in range(rows.shape[0]):
-        broken |= rows[r, SIGN] == 0 and low[r] > KEPT
-    for p in range(pieces):
-        least = min(by_piece[p, 0, 0], by_piece[p, 1, 0])
-        for side in range(2):
-            if by_piece[p, side, 0] > least:
-                continue
-            told = component_of(
-                blocks, knot_of, knots, ends[p, 0], ends[p, 1], 1.0 - 2.0 * side, cells,
-                vehicle,
-            )  # fmt: skip
-            if told == LOST and not broken and least == 0:
-                by_piece[p, side, 0] = UNREACHABLE
-            elif told != REACHED:
-                return False
-    return True
 
 
 @kernel()
@@ -428,16 +410,15 @@ def judge_pairs(
         of_motion = groups[first_group[n] : first_group[n + 1]]
         room = (
             np.zeros(ROOM),
-            np.empty((most, LANES * of_motion.shape[0])),
-            np.empty(most),
+            np.empty((PER_ROW * of_motion.shape[0], 2)),
+            np.empty(most + 1),
             np.empty(most),
             np.empty(2 * LANES * most),
             np.empty(wide * most),
-            np.empty(wide // LANES * most),
+            np.empty((most, PER_ROW * of_motion.shape[0])),
             (np.empty((HALVES * wide, FIELDS)), np.zeros(HALVES * wide, np.bool_)),
             np.empty(most),
             np.empty(most),
-            np.empty(most, np.int64),
             np.empty((most + 2, 3)),
             np.empty((STACK + LANES, 4)),
             np.empty(STACK + LANES, np.int64),

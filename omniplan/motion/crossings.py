@@ -19,6 +19,8 @@ def with_crossings(
     """Insert samples where a column crosses a level, exactly at the level."""
     values = samples[:, column] - level
     at = np.flatnonzero(values[:-1] * values[1:] < 0)
+    if not at.size:
+        return t, samples
     f = values[at] / (values[at] - values[at + 1])
     new = samples[at] + f[:, None] * (samples[at + 1] - samples[at])
     new[:, column] = level

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from configspace import Vehicle, exact_v_max
 from configspace.angles import wrap
-from configspace.exact import active_rows
 from configspace.limits import LoadRow, rows_of
 from configspace.vehicle import SteerableWheel
 from omniplan.judging.swing import (
@@ -155,9 +154,10 @@ def _speeds(
     v = v * factor
     shares = np.stack(share)
     high = shares.max(axis=0) / LEAST_LOAD
-    for row in active_rows(rows_of(owner)[0], False):
+    for row in rows_of(owner)[0]:
+        holds = (row.direction == "both") | ~forward
         for quotient in _quotients(row, shares, v, s, radius):
-            high = np.minimum(high, quotient)
+            high = np.where(holds, np.minimum(high, quotient), high)
     high = np.where(_is_out(owner, factor, ends, radius), 0.0, high)
     return share[0] * exact[0], share[1] * exact[1], high
 

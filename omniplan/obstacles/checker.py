@@ -154,6 +154,8 @@ class CollisionChecker:
         x0, y0, x1, y1 : float, m
             From where to where K moves.
         """
+        if not math.isfinite(x0 + y0 + x1 + y1):
+            raise not_finite((x0, y0) if not math.isfinite(x0 + y0) else (x1, y1))
         return self._broad.is_clear(x0, y0, x1, y1, self._ball)
 
     def are_free(self, poses: npt.ArrayLike) -> BoolArray:

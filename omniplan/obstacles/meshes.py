@@ -91,6 +91,9 @@ def _checked_heights(heights: tuple[float, float]) -> tuple[float, float]:
 
 def _checked_mesh(name: str, mesh: Mesh) -> tuple[FloatArray, IntArray]:
     """Return corners merged where they are equal, and faces; or raise."""
+    if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
+        allowed = "a trimesh.Trimesh, or anything with vertices and faces"
+        raise InvalidInput(Problem(name, repr(mesh)[:60], allowed))
     vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     if not len(faces):

@@ -82,6 +82,9 @@ class Obstacles:
         >>> hall.names, hall.bounds
         (('pillar',), (1.0, 0.0, 2.0, 1.0))
         """
+        if isinstance(polygons, str) or not isinstance(polygons, Iterable):
+            allowed = "a list of polygons, or a mapping from names to polygons"
+            raise InvalidInput(Problem("obstacles", repr(polygons)[:60], allowed))
         named = dict(polygons) if isinstance(polygons, Mapping) else _numbered(polygons)
         found: list[Geometries] = []
         problems: list[Problem] = []

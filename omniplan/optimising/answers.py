@@ -8,11 +8,12 @@ import time as clock
 from dataclasses import dataclass
 
 from omniplan.obstacles import Hit
-from omniplan.optimising.attempts import Attempts, Candidate, Task
+from omniplan.optimising.attempts import WORTH_A_LOOK, Attempts, Candidate, Task
 from omniplan.optimising.limits import top_speed
 from omniplan.optimising.realising import Realised
-from omniplan.optimising.setting import SolverStatus
-from omniplan.optimising.warm_start import courses_of
+from omniplan.optimising.repairing import Repair
+from omniplan.optimising.setting import Guess, SolverStatus
+from omniplan.optimising.warm_start import courses_of, guess_of
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.report import Report
 
@@ -39,6 +40,7 @@ class Answers:
 
     task: Task
     attempts: Attempts
+    repair: Repair
     began: float
     """By `time.perf_counter`, s."""
 
@@ -72,6 +74,8 @@ class Answers:
         text = f"{what} {best.score:.4g} {unit}"
         if before is not None:
             text += f" instead of {before.score:.4g} {unit}"
+        if best.way == "plan":
+            text += ", planned anew between the ends: no small change mends the way"
         if best.way == "timing":
             text += f", on the path as given{self._end()}"
         if task.objective == "change":
@@ -86,28 +90,43 @@ class Answers:
         return f" (solver: {solution.status.value})"
 
     def refusal(self) -> Plan:
-        """Return why there is no trajectory: what was refused last, and where."""
+        """Return why there is no trajectory: which limit cannot be kept, and where."""
         task, attempts = self.task, self.attempts
-        solution, refused = attempts.solution, attempts.refused
-        status = PlanStatus.TIMEOUT
-        if solution is not None:
-            status = _STATUS[solution.status]
-        reason, place = "there was no time to begin", None
-        if solution is not None:
-            broken = f"{solution.violation:.2g}"
-            reason = f"the solver ended with limits exceeded by {broken} of themselves"
-        if refused is not None:
-            reason, place = _refused(refused)
-        if solution is not None and solution.place is not None:
-            place = solution.place
-            x, y, theta = place[0], place[1], math.degrees(place[2])
-            reason = (
-                f"limits contradict each other near x = {x:.2f} m, y = {y:.2f} m, "
-                f"θ = {theta:.0f}°; as given: {reason}"
-            )
-        message = f"{task.name} by {task.space.name}: {status.value}: {reason}"
-        report = None if refused is None else refused.report
-        return self.no(status, message, place, report)
+        miss = self._miss()
+        status = self._status()
+        is_given = miss is None
+        if miss is None:
+            courses, waits = self.repair.courses, self.repair.waits
+            miss = task.judged(guess_of(courses, waits, task.intervals))
+        text, place = _refused(miss)
+        if is_given:
+            text = f"there was no time to mend it; as given: {text}"
+        elif status is PlanStatus.INFEASIBLE:
+            text = f"no way near it keeps all limits; the nearest tried: {text}"
+        elif attempts.refused is not miss:
+            text = f"the nearest way tried: {text}"
+        message = f"{task.name} by {task.space.name}: {status.value}: {text}"
+        return self.no(status, message, place, miss.report)
+
+    def _status(self) -> PlanStatus:
+        solution = self.attempts.solution
+        limits_are_broken = solution is None or solution.violation > WORTH_A_LOOK
+        if self.repair.is_exhausted and limits_are_broken:
+            return PlanStatus.INFEASIBLE
+        if solution is None:
+            return PlanStatus.TIMEOUT
+        return _STATUS[solution.status]
+
+    def _miss(self) -> Realised | None:
+        """Return what came nearest to being permitted, with its verdicts."""
+        solution, nearest = self.attempts.solution, self.repair.start
+        options: list[Guess] = [] if nearest is None else [nearest]
+        if solution is not None and solution.value is not None:
+            options.append(solution.value)
+        misses = [self.task.judged(guess) for guess in options]
+        if self.attempts.refused is not None:
+            misses.append(self.attempts.refused)
+        return min(misses, key=_badness, default=None)
 
     def no(
         self,
@@ -150,10 +169,23 @@ class Answers:
         return statistics
 
 
+def _badness(miss: Realised) -> float:
+    """Return by how much the worst limit is exceeded, relative; 0 for a mere hit."""
+    worst = miss.report.headline
+    if worst is None:
+        return 0.0
+    if worst.value is None:
+        return math.inf
+    scale = worst.scale or abs(worst.bound) or 1.0
+    return abs(worst.value - worst.bound) / scale
+
+
 def _refused(refused: Realised) -> tuple[str, tuple[float, float, float] | None]:
     """Return why a trajectory was refused, and where."""
     worst = refused.report.headline
     if worst is not None:
         return str(worst), worst.pose
+    if refused.hit is None:  # it may be driven, but it was not asked for
+        return "the solver was not content with it", None
     assert isinstance(refused.hit, Hit)
     return refused.hit.message, refused.hit.pose

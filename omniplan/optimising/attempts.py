@@ -13,7 +13,7 @@ from configspace import PermissibleSpace, Vehicle
 from omniplan.judging.rows import Tolerances
 from omniplan.obstacles import CollisionChecker
 from omniplan.optimising.limits import Rules, Tightness
-from omniplan.optimising.measure import change_between, jerk_of
+from omniplan.optimising.measure import change_of, jerk_of
 from omniplan.optimising.problem import build_problem
 from omniplan.optimising.realising import (
     PER_INTERVAL,
@@ -34,8 +34,9 @@ from omniplan.optimising.setting import (
 from omniplan.optimising.warm_start import Course, guess_of, signs_of
 from omniplan.path import Path
 from omniplan.trajectory import Trajectory
+from omniplan.validation import validate
 
-__all__ = ["Attempts", "Candidate", "Task"]
+__all__ = ["WORTH_A_LOOK", "Attempts", "Candidate", "Task"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -90,6 +91,20 @@ class Task:
         """Return the trajectory of a motion with its verdicts."""
         return self.realised(self.trajectory_of(guess))
 
+    def judged(self, guess: Guess) -> Realised:
+        """Return the trajectory of a motion as it is, with its verdicts."""
+        made = self.trajectory_of(guess)
+        report = validate(
+            made,
+            self.space,
+            self.tolerances,
+            allow_unreachable=self.allow_unreachable,
+        )
+        hit = None
+        if self.checker is not None:
+            hit = self.checker.first_hit_of_trajectory(made)
+        return Realised(made, report, hit)
+
     def realised(self, trajectory: Trajectory) -> Realised:
         """Return a trajectory with its verdicts, slower if need be."""
         return realise(
@@ -118,7 +133,7 @@ class Candidate:
     realised: Realised
     score: float
     way: str
-    """``solver``, ``timing`` or ``input``."""
+    """``solver``, ``timing``, ``nearest``, ``plan`` or ``input``."""
     change: float = 0.0
     """Largest change of a pose; for the objective ``change``, m."""
 
@@ -130,6 +145,8 @@ class Attempts:
     task: Task
     deadline: float
     """Of `time.perf_counter`, s."""
+    way: FloatArray = field(repr=False)
+    """(n, 3) m, m, rad: the way of K as it was given, densely."""
     iterations: int = 0
     solves: int = 0
     unknowns: int = 0
@@ -149,21 +166,26 @@ class Attempts:
         self, courses: Sequence[Course], waits: Sequence[float]
     ) -> tuple[Guess, tuple[int, ...]]:
         """Return the motion along courses, and its representations."""
+        guess = guess_of(courses, waits, self.task.intervals)
+        return guess, self.signs_of(guess)
+
+    def signs_of(self, guess: Guess) -> tuple[int, ...]:
+        """Return the representations of a motion, leg by leg."""
         task = self.task
-        guess = guess_of(courses, waits, task.intervals)
         if not task.rules.has_configuration:
-            return guess, (1,) * len(courses)
+            return (1,) * len(guess.legs)
         start, middles = 0.0, []
         for leg, wait in zip(guess.legs, [*guess.waits, 0.0], strict=True):
             middles.append(start + leg.duration / 2)
             start += leg.duration + wait
-        return guess, signs_of(task.trajectory_of(guess), middles, task.space)
+        return signs_of(task.trajectory_of(guess), middles, task.space)
 
     def improve(
         self,
         guess: Guess,
         signs: tuple[int, ...],
         *,
+        meant: Guess | None = None,
         longest: float | None = None,
         has_swing: bool = False,
         share: float = 1.0,
@@ -174,6 +196,8 @@ class Attempts:
         ----------
         guess : Guess
         signs : tuple of {1, -1}
+        meant : Guess, optional
+            What is to be changed least, or smoothed; by default the guess.
         longest : float, s, optional
             Largest duration.
         has_swing : bool
@@ -182,7 +206,7 @@ class Attempts:
             Of the time that is left.
         """
         task, end = self.task, clock.perf_counter() + share * self.time_left
-        reference = None if task.objective == "time" else guess
+        reference = None if task.objective == "time" else meant or guess
         tightness, pad = Tightness(), PAD
         known: tuple[Separation, ...] = ()
         for _ in range(ROUNDS):
@@ -264,7 +288,7 @@ class Attempts:
         if task.objective == "change":
             assert reference is not None
             proved = [self.at_pace(proved, reference.duration)]
-        rated = [self.rated(one, found, reference) for one in proved]
+        rated = [self.rated(one) for one in proved]
         return min(rated, key=lambda one: one.score)
 
     def at_pace(self, options: Sequence[Realised], duration: float) -> Realised:
@@ -277,20 +301,17 @@ class Attempts:
                 return slower
         return fastest
 
-    def rated(
-        self, realised: Realised, found: Guess | None, reference: Guess | None
-    ) -> Candidate:
+    def rated(self, realised: Realised, way: str = "solver") -> Candidate:
         """Return a proved trajectory with what it is compared by."""
-        task = self.task
+        task, found = self.task, realised.trajectory
+        kappa_g = task.rules.kappa_g
         if task.objective == "time":
-            return Candidate(realised, realised.trajectory.duration, "solver")
+            return Candidate(realised, found.duration, way)
         if task.objective == "smooth":
-            score = jerk_of(realised.trajectory, task.rules.kappa_g)
-            return Candidate(realised, score, "solver")
-        assert found is not None
-        assert reference is not None
-        mean, largest = change_between(found, reference, task.rules.kappa_g)
-        return Candidate(realised, mean, "solver", largest)
+            return Candidate(realised, jerk_of(found, kappa_g), way)
+        reference = task.rules.reference
+        mean, largest = change_of(found, self.way, reference, kappa_g)
+        return Candidate(realised, mean, way, largest)
 
     def _stricter(self, tightness: Tightness, pad: float) -> tuple[Tightness, float]:
         """Return larger margins for what was refused."""

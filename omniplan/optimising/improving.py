@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import get_args
 
+import numpy as np
+
 from configspace import InvalidInput, PermissibleSpace, Problem
 from configspace.space import require_space
 from omniplan.errors import InvalidTrajectory
@@ -15,8 +17,10 @@ from omniplan.judging.rows import Tolerances
 from omniplan.obstacles import CollisionChecker, Obstacles
 from omniplan.optimising.answers import Answers
 from omniplan.optimising.attempts import Attempts, Candidate, Task
+from omniplan.optimising.hopeless import hopeless_reason
 from omniplan.optimising.limits import rules_of, top_speed
 from omniplan.optimising.realising import Realised
+from omniplan.optimising.repairing import Repair
 from omniplan.optimising.separation import Surroundings
 from omniplan.optimising.setting import Box, Objective
 from omniplan.optimising.warm_start import (
@@ -27,7 +31,7 @@ from omniplan.optimising.warm_start import (
     rounded,
 )
 from omniplan.path import Path
-from omniplan.planning.result import Plan, PlanStatus
+from omniplan.planning.result import Plan
 from omniplan.trajectory import Trajectory, require_motion
 from omniplan.validation import validate
 
@@ -39,6 +43,8 @@ GAIN = 1e-3
 """What is better by less than this share is no better."""
 LONGER = 1.25
 """How much longer than its fastest timing a smooth motion on a path may take."""
+MOST_PLACES = 1500
+"""By so many poses the way given is known when changes are measured."""
 FIRST = 0.6
 """Share of the time for a first try, if others may follow."""
 
@@ -233,16 +239,22 @@ class _Optimisation:
         self, task: Task, given: Trajectory | Path, began: float, time: float
     ) -> None:
         self._task, self._given = task, given
-        self._attempts = Attempts(task, deadline=began + time)
-        self._answers = Answers(task, self._attempts, began)
         self._courses, self._waits = courses_of(
             given, task.rules.reference, top_speed(task.rules)
         )
+        way = np.concatenate([course.poses for course in self._courses])
+        thinned = way[:: 1 + len(way) // MOST_PLACES]
+        self._attempts = Attempts(task, began + time, np.append(thinned, way[-1:], 0))
+        self._longest: float | None = None
+        if task.objective == "smooth" and isinstance(given, Trajectory):
+            self._longest = given.duration
+        self._repair = Repair(self._attempts, self._courses, self._waits)
+        self._answers = Answers(task, self._attempts, self._repair, began)
 
     def run(self) -> Plan:
-        blocked = self._blocked_end()
-        if blocked is not None:
-            return blocked
+        hopeless = hopeless_reason(self._task, self._courses, self._longest)
+        if hopeless is not None:
+            return self._answers.no(*hopeless)
         before = self._input()
         if self._task.objective == "change" and before is not None:
             return self._answers.found(before, before)
@@ -254,22 +266,6 @@ class _Optimisation:
             options, key=lambda one: one.score * (1 + GAIN * (one is not before))
         )
         return self._answers.found(best, before)
-
-    def _blocked_end(self) -> Plan | None:
-        """Return why the start or the goal cannot be kept, None if both can."""
-        task = self._task
-        if task.checker is None or not task.keep_ends:
-            return None
-        ends = (self._courses[0].poses[0], self._courses[-1].poses[-1])
-        statuses = (PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED)
-        for pose, status in zip(ends, statuses, strict=True):
-            hit = task.checker.hit_at(pose)
-            if hit is not None:
-                message = (
-                    f"{task.name} by {task.space.name}: {status.value}: {hit.message}"
-                )
-                return self._answers.no(status, message, hit.pose)
-        return None
 
     def _input(self) -> Candidate | None:
         """Return the input as a candidate, None if it is no proved trajectory."""
@@ -291,34 +287,49 @@ class _Optimisation:
             return None
         score = 0.0
         if task.objective != "change":
-            score = self._attempts.rated(realised, None, None).score
+            score = self._attempts.rated(realised).score
         return Candidate(realised, score, "input")
 
     def _found(self, before: Candidate | None) -> Candidate | None:
-        """Return the best that timing and solving lead to."""
-        objective = self._task.objective
-        timed = self._timed()
+        """Return the best that timing, mending and solving lead to."""
+        objective, timed = self._task.objective, self._timed()
+        if objective == "change":
+            return self._mended() if timed is None else self._at_pace(timed)
+        start = timed or self._repair.nearest()
         if objective == "time":
-            return self._fastest(timed)
-        if objective == "change" and timed is not None:
-            return self._at_pace(timed)
-        courses, waits = self._courses, self._waits
-        longest = None
-        if objective == "smooth":
-            longest = sum(course.duration for course in courses) + sum(waits)
-            if isinstance(self._given, Path) and timed is not None:
-                longest = LONGER * timed.realised.trajectory.duration
-        return self._improved(courses, waits, longest=longest)
+            return self._fastest(start)
+        longest = self._longest
+        if longest is None and start is not None:
+            longest = LONGER * start.realised.trajectory.duration
+        return self._improved(self._courses, self._waits, longest=longest)
+
+    def _mended(self) -> Candidate | None:
+        """Return what is permitted near a way that is not."""
+        near = self._repair.nearest()
+        if near is not None:
+            return near
+        attempts, start = self._attempts, self._repair.start
+        if start is not None:
+            meant, _ = attempts.guess(self._courses, self._waits)
+            signs = attempts.signs_of(start)
+            swings = self._task.rules.bounds_swing
+            found = attempts.improve(
+                start, signs, meant=meant, has_swing=swings, share=FIRST
+            )
+            if found is not None:
+                return found
+        found = self._improved(self._courses, self._waits)
+        return self._repair.planned() if found is None else found
 
     def _fastest(self, timed: Candidate | None) -> Candidate | None:
         """Return the fastest: of the path as it is, or of one near it."""
         courses, waits = self._courses, self._waits
         if timed is not None:
-            courses, waits = self._courses_of(timed)
+            courses, waits = self._repair.courses_along(timed)
         found = self._improved(courses, waits)
         if found is not None and self._task.rules.bounds_swing:
             # The solver has not been told of steering accelerations yet.
-            guess, signs = self._attempts.guess(*self._courses_of(found))
+            guess, signs = self._attempts.guess(*self._repair.courses_along(found))
             finer = self._attempts.improve(guess, signs, has_swing=True)
             found = _better(found, finer)
         return _better(timed, found)
@@ -331,7 +342,7 @@ class _Optimisation:
             return None
         if task.objective == "change":
             return Candidate(realised, 0.0, "timing")
-        return replace(self._attempts.rated(realised, None, None), way="timing")
+        return self._attempts.rated(realised, "timing")
 
     def _at_pace(self, timed: Candidate) -> Candidate:
         """Return the unchanged path at a pace as near to the given one as can be."""
@@ -341,11 +352,6 @@ class _Optimisation:
             slower = self._task.realised(self._given)
             options += [slower] if slower.is_proved else []
         return replace(timed, realised=self._attempts.at_pace(options, duration))
-
-    def _courses_of(self, candidate: Candidate) -> tuple[list[Course], list[float]]:
-        rules = self._task.rules
-        trajectory = candidate.realised.trajectory
-        return courses_of(trajectory, rules.reference, top_speed(rules))
 
     def _improved(
         self,

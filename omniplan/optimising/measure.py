@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from omniplan.motion import PoseMotion
-from omniplan.optimising.setting import Guess
-from omniplan.optimising.warm_start import splines_of
+from omniplan.optimising.warm_start import moved
 from omniplan.trajectory import Trajectory
 
-__all__ = ["change_between", "jerk_of"]
+__all__ = ["change_of", "jerk_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
 DENSE = 800
-"""Places by which the way of a leg is known."""
+"""Places by which the way of a trajectory is known."""
 
 
 def jerk_of(trajectory: Trajectory, kappa_g: float) -> float:
@@ -34,29 +35,37 @@ def jerk_of(trajectory: Trajectory, kappa_g: float) -> float:
     return float(jerk @ np.diff(trajectory.t))
 
 
-def change_between(found: Guess, meant: Guess, kappa_g: float) -> tuple[float, float]:
-    """Return how far the knots of a motion are from the way of another, leg by leg.
+def change_of(
+    trajectory: Trajectory, way: FloatArray, reference: complex, kappa_g: float
+) -> tuple[float, float]:
+    """Return how far a trajectory is from a way, place by place.
 
     Parameters
     ----------
-    found, meant : Guess
-        With the same number of legs.
+    trajectory : Trajectory
+        Of poses.
+    way : (n, 3) float, m, m, rad
+        Poses of K, densely.
+    reference : complex, m
+        K in the vehicle file's frame.
     kappa_g : float, 1/m
         A radian counts 1/κ_g metres.
 
     Returns
     -------
     mean, largest : float, m
-        Root mean square, and the largest.
+        Root mean square along the way of the trajectory, and the largest.
     """
     scale = np.array([1.0, 1.0, 1 / kappa_g])
-    apart = []
-    for leg, other in zip(found.legs, meant.legs, strict=True):
-        spline = splines_of(other)
-        way = np.asarray(spline(np.linspace(0.0, spline.x[-1], DENSE))) * scale
-        apart.append(_distances(leg.poses * scale, way))
-    off = np.concatenate(apart)
-    return float(np.sqrt(np.mean(off**2))), float(off.max())
+    point = complex(*trajectory.reference_point)
+    motion = PoseMotion(trajectory.t, trajectory.samples, point)
+    t = np.linspace(trajectory.t[0], trajectory.t[-1], DENSE + 1)
+    points = moved(motion.poses_at(t), reference - point) * scale
+    off = _distances(points, way * scale)
+    gone = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    square = (off[1:] ** 2 + off[:-1] ** 2) / 2
+    mean = float(square @ gone) / max(float(gone.sum()), 1e-12)
+    return math.sqrt(mean), float(off.max())
 
 
 def _distances(points: FloatArray, way: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omniplan.optimising.setting import Guess, Leg, Setting
 
-__all__ = ["GIVE", "STATE", "SWING", "H", "Unknowns"]
+__all__ = ["BEGIN", "GIVE", "STATE", "SWING", "H", "Unknowns"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,6 +28,11 @@ class Unknowns:
     """Order and ranges of the unknowns: knots leg by leg, waits, lines."""
 
     setting: Setting
+
+    def give_of(self, leg: int, interval: int) -> int:
+        """Return the number of the unknown by which limits give way in an interval."""
+        before = sum(n + 1 for n in self.setting.intervals[:leg])
+        return STATE * (before + interval) + GIVE
 
     def packed(self, guess: Guess) -> FloatArray:
         """Return a motion as a row."""

@@ -27,6 +27,8 @@ __all__ = [
     "guess_of",
     "leg_through",
     "merged",
+    "moved",
+    "rounded",
     "signs_of",
     "splines_of",
 ]
@@ -107,7 +109,7 @@ def courses_of(
 
 def _of_piece(piece: PathPiece, reference: complex, top_speed: float) -> Course:
     u = np.linspace(piece.u[0], piece.u[-1], DENSE + 1)
-    poses = _moved(piece.poses_at(u), reference - piece.point)
+    poses = moved(piece.poses_at(u), reference - piece.point)
     t = (u - u[0]) / (UNHURRIED * top_speed)
     return _rested(Course(t, poses), starts=False, ends=False)
 
@@ -125,7 +127,7 @@ def _of_trajectory(
     pause = 0.0
     for first, last in itertools.pairwise(rows):
         t = np.linspace(trajectory.t[first], trajectory.t[last], DENSE + 1)
-        poses = _moved(motion.poses_at(t), reference - point)
+        poses = moved(motion.poses_at(t), reference - point)
         if _length(poses) < STILL:
             pause += float(t[-1] - t[0])
             continue
@@ -145,7 +147,7 @@ def _length(poses: FloatArray) -> float:
     return float(np.linalg.norm(steps, axis=1).sum())
 
 
-def _moved(poses: FloatArray, offset: complex) -> FloatArray:
+def moved(poses: FloatArray, offset: complex) -> FloatArray:
     """Return the poses of another point of the body, `offset` away in its frame."""
     place = poses[:, 0] + 1j * poses[:, 1] + np.exp(1j * poses[:, 2]) * offset
     return np.stack([place.real, place.imag, poses[:, 2]], axis=-1)

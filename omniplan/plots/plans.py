@@ -96,9 +96,9 @@ def panels(
 
 
 def _draw_scale(axes: Axes, width: float) -> None:
-    """Draw a bar of a round length, about a fifth of the width, m."""
-    step = 10.0 ** math.floor(math.log10(width / 5))
-    length = max(n * step for n in (1, 2, 5) if n * step <= width / 5)
+    """Draw a bar of a round length, at most a quarter of the width, m."""
+    step = 10.0 ** math.floor(math.log10(width / 4))
+    length = max(n * step for n in (1, 2, 5) if n * step <= width / 4)
     bar = AnchoredSizeBar(
         axes.transData,
         length,

@@ -34,6 +34,8 @@ UNREACHABLE = 0.75
 one of a permitted configuration tells more."""
 BETWEEN = 0.875
 """What a piece counts that breaks limits between the samples only."""
+ROUNDED = 1e-3
+"""Slower than this share of what counts as standing no direction is told."""
 MAX_LABELS = 8
 """So many ways to have come to a piece are kept for each representation."""
 
@@ -289,7 +291,8 @@ class _Changes:
                 _configuration(start, before, judge),
                 _configuration(end, after, judge),
             )
-            if not self._changer.stays(*near):
+            is_clear = self._is_clear(start) and self._is_clear(end)
+            if not (is_clear and self._changer.stays(*near)):
                 start, end = self._edges_of(i)
             self._known[key] = self._changer.change(
                 _configuration(start, before, judge),
@@ -297,6 +300,15 @@ class _Changes:
                 end.t - start.t,
             )
         return self._known[key]
+
+    def _is_clear(self, at: Edge) -> bool:
+        """Return whether the wheels' directions are more than rounding there.
+
+        A part that is refused may begin or end in the rest itself.
+        """
+        body = abs(at.v + 1j * at.omega * self._judge.reference)
+        speed = max(body, abs(at.omega) / self._judge.kappa_g)
+        return speed > ROUNDED * self._tolerances.standstill
 
     def _moving_edges(self, i: int) -> tuple[Edge, Edge]:
         """Return where the moving parts around standstill i end and begin."""

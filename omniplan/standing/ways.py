@@ -86,7 +86,10 @@ class Changer:
         if abs(turn) <= self._tolerances.alignment:
             stay = Way(0.0, tuple(self._aligned(start, goal)))
             return Change(start, goal, wheel, turn, (stay,))
-        ways = [self._way(legs) for legs in _ways(start, goal)]
+        ways: list[Way] = []
+        for legs in _ways(start, goal):
+            quickest = min((way.time for way in ways), default=math.inf)
+            ways.append(self._way(legs, quickest))
         quickest = min(way.time for way in ways)
         if quickest > rest or math.isinf(quickest):
             ways += self._searched(start, goal, quickest, rest)
@@ -182,8 +185,15 @@ class Changer:
         worst = max(turns, key=lambda i: abs(turns[i]))
         return worst, turns[worst]
 
-    def _way(self, legs: list[list[Configuration]]) -> Way:
-        found = [self._leg(leg) for leg in legs]
+    def _way(self, legs: list[list[Configuration]], known: float = math.inf) -> Way:
+        """Return the way along some legs; where no wheel winds only a quicker one."""
+        found: list[Way] = []
+        is_one_enough = not self._judge.winding_wheels
+        for leg in legs:
+            found.append(self._leg(leg))
+            time = sum(way.time for way in found)
+            if is_one_enough and (time >= known or math.isinf(time)):
+                return Way(math.inf, ())
         return Way(
             sum(way.time for way in found),
             # At a pole, where legs join, the wheels stand alike for every β.

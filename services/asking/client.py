@@ -284,6 +284,9 @@ class Client(Connection):
     def register(self, vehicle: Vehicle, expected_version: str | None = None) -> str:
         """Register a vehicle, or a new version of it, with all servers of the site.
 
+        Where the answer is lost it is asked again, and done once: if somebody else has
+        changed the vehicle since, RemoteError with code ``conflict`` says so.
+
         Parameters
         ----------
         vehicle : Vehicle
@@ -305,6 +308,8 @@ class Client(Connection):
 
     def unregister(self, name: str, expected_version: str | None = None) -> str:
         """Remove a registered vehicle from all servers of the site.
+
+        Where the answer is lost it is asked again, as by `register`.
 
         Parameters
         ----------

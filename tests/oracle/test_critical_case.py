@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 import pytest
+from connette import RATE, SETS, care_o_bot, long_run
 
 import configspace
-from benchmarks.connette import RATE, SETS, care_o_bot, long_run
 from configspace.spherical import from_spherical, spherical_to_omni_curve
 from omniplan import Report, Trajectory, validate
 from omniplan.standing.transitions import TransitionMap

@@ -299,8 +299,8 @@ def test_chunks_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (0, ("mecanum",), "trajectories: empty"),
         (1, (), "spaces: empty"),
-        (1, ("mecanum", "mecanum"), "spaces: mecanum more than once"),
-        (2, ("mecanum",), "trajectories: trajectory more than once"),
+        (1, ("mecanum", "mecanum"), 'spaces: the name "mecanum" more than once'),
+        (2, ("mecanum",), 'trajectories: the name "trajectory" more than once'),
     ],
 )
 def test_empty_lists_and_repeated_names_are_refused(

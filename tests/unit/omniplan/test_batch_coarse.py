@@ -1,5 +1,6 @@
 """The bounds of groups are held against what the rows say of single parts."""
 
+import itertools
 import math
 from typing import Any
 
@@ -10,11 +11,13 @@ import pytest
 import configspace
 from omniplan import Tolerances, Trajectory
 from omniplan.batch.chords import HIGH, LOW, ROOM
-from omniplan.batch.coarse import GROUP, SCRATCH, groups_of, screen
+from omniplan.batch.coarse import screen
 from omniplan.batch.fleet import Fleet, fleet_of
-from omniplan.batch.kinds import BOUND, KIND, RANGE, RANGE_ERROR
-from omniplan.batch.motions import LANES, Motions, motions_of
+from omniplan.batch.groups import PER_ROW, groups_of
+from omniplan.batch.kinds import BOUND, KIND, RANGE, RANGE_ERROR, SIGN, SWING
+from omniplan.batch.motions import LANES, Motions, enclose, motions_of
 from omniplan.batch.refine import KEPT, NO, YES, load, one_row
+from omniplan.batch.rows import SETTLING
 from omniplan.bench_cases import KINDS, random_trajectories, random_vehicles
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,12 +52,16 @@ def fleet() -> Fleet:
 def bounds_of(
     motions: Motions, n: int, rows: FloatArray, vehicle: FloatArray
 ) -> FloatArray:
-    """(r, groups) upper bounds."""
+    """(r, blocks) upper bounds."""
     groups, first = groups_of(motions)
     mine = groups[first[n] : first[n + 1]]
-    out = np.empty((len(rows), LANES * len(mine)))
-    screen(mine, rows, vehicle, LIMITS, np.empty((SCRATCH, LANES)), out)
-    return out[:, : (motions.first[n + 1] - motions.first[n]) * LANES // GROUP]
+    out = np.empty((len(rows), PER_ROW * len(mine)))
+    crest = np.empty((PER_ROW * len(mine), 2))
+    screen(mine, rows, vehicle, LIMITS, out, crest)
+    np.testing.assert_array_equal(crest[:, 0], out.max(axis=0))
+    counting = np.where(np.isfinite(out), out, 0.0)[rows[:, SIGN] == 0]
+    np.testing.assert_array_equal(crest[:, 1], counting.max(axis=0, initial=0.0))
+    return out[:, : motions.first[n + 1] - motions.first[n]]
 
 
 def parts_of(
@@ -87,7 +94,7 @@ def test_bounds_of_groups_are_never_exceeded_and_often_of_use() -> None:
     for n in range(len(motions.count)):
         for v, body in enumerate(vehicles.bodies):
             rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
-            top = np.repeat(bounds_of(motions, n, rows, body), GROUP, axis=1)
+            top = np.repeat(bounds_of(motions, n, rows, body), LANES, axis=1)
             low, high = parts_of(motions, n, rows, body, NO)
             error = np.where(rows[:, KIND] == RANGE, RANGE_ERROR / np.maximum(
                 rows[:, BOUND], 1e-3), 0.0)  # fmt: skip
@@ -115,11 +122,62 @@ def test_bounds_of_groups_hold_between_the_ends_of_parts() -> None:
         motions.blocks[a:b].transpose(1, 0, 2).reshape(motions.blocks.shape[1], -1)[16]
         for a, b in zip(motions.first, motions.first[1:], strict=False)
     ]
-    group = np.minimum(
-        np.searchsorted(ends[0], ends[1] - 1e-9) // GROUP, len(ends[0]) // GROUP - 1
+    block = np.minimum(
+        np.searchsorted(ends[0], ends[1] - 1e-9) // LANES, len(ends[0]) // LANES - 1
     )
     for v, body in enumerate(vehicles.bodies):
         rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
-        top = bounds_of(motions, 0, rows, body)[:, group]
+        top = bounds_of(motions, 0, rows, body)[:, block]
         low, _ = parts_of(motions, 1, rows, body, YES)
         assert (low <= top * (1 + 1e-9) + 1e-9).all()
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_bounds_of_groups_hold_between_the_ends_of_parts_of_splines() -> None:
+    """At times inside the parts, towards rest as well, no more is reached."""
+    motions, vehicles = motions_of(trajectories()[:3]), fleet()
+    room = np.zeros(ROOM)
+    view = room.reshape(-1, LANES)
+    for n, v in itertools.product(range(len(motions.count)), range(len(KINDS))):
+        rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
+        top = bounds_of(motions, n, rows, vehicles.bodies[v])
+        # Those about accelerations of steering need more than the enclosures.
+        plain = [r for r in range(len(rows)) if rows[r, KIND] < SWING]
+        for b in range(top.shape[1]):
+            at = motions.first[n] + b
+            for share in (0.1, 0.5, 0.93):
+                for k in range(LANES):
+                    start, end = motions.blocks[at, 15:17, k]
+                    t = start + share * (end - start)
+                    knot = motions.knots[motions.knot_of[at, k]]
+                    enclose(knot, motions.forms[n], t, t, view, k)
+                for r in plain:
+                    one_row_alone(room, rows, r, vehicles.bodies[v], YES)
+                    low = room[LOW : LOW + LANES].max()
+                    assert low <= top[r, b] * (1 + 1e-9) + 1e-9, (n, v, b, r)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_range_is_settled_as_by_arc_tangents() -> None:
+    motions, vehicles = motions_of(trajectories()), fleet()
+    room, seen = np.zeros(ROOM), set()
+    for v, body in enumerate(vehicles.bodies):
+        rows = vehicles.rows[vehicles.first[v] : vehicles.first[v + 1]]
+        for b, r in itertools.product(
+            range(0, len(motions.blocks), 3), np.flatnonzero(rows[:, KIND] == RANGE)
+        ):
+            found = []
+            for exact in (YES, SETTLING):
+                load(motions.blocks, b, room)
+                one_row_alone(room, rows, int(r), body, exact)
+                found.append(
+                    (room[LOW : LOW + LANES] + 0, room[HIGH : HIGH + LANES] + 0)
+                )
+            (low, high), (quick_low, quick_high) = found
+            open_ = high > KEPT
+            np.testing.assert_array_equal(quick_low[open_], low[open_])
+            np.testing.assert_array_equal(quick_high[open_], high[open_])
+            assert (quick_low <= low).all()
+            assert (quick_high >= low * (1 - 1e-12)).all()
+            seen |= set(open_)
+    assert seen == {True, False}

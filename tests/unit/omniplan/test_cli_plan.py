@@ -120,13 +120,19 @@ def test_a_scenario_writes_its_folder(capsys: Capture, tmp_path: Path) -> None:
     code, found = answer(capsys, "--scenario", "pillar", "--out", str(tmp_path / "out"))
     assert code == 0
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["pillar-platform-synchro.csv", "pillar.gif", "pillar.png"]
+    assert names == [
+        "pillar-platform-all-wheel.csv",
+        "pillar-platform-mecanum.csv",
+        "pillar-platform-synchro.csv",
+        "pillar.gif",
+        "pillar.png",
+    ]
     assert (tmp_path / "out" / "pillar.gif").stat().st_size < 1_000_000
     solutions = found["solutions"]
     assert isinstance(solutions, list)
-    (solution,) = solutions
-    assert solution["vehicle"] == "platform-synchro"
-    assert solution["swept_area"] > 3
+    synchro, all_wheel, mecanum = solutions
+    assert synchro["vehicle"] == "platform-synchro"
+    assert all(each["swept_area"] > 3 for each in (synchro, all_wheel, mecanum))
 
 
 def test_a_scenario_prints_a_table(capsys: Capture) -> None:

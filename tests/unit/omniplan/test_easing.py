@@ -47,7 +47,8 @@ def driven(*steps: tuple[float, float], line: float = 0.0) -> list[Move]:
 def curvature_of(way: Eased, s: float) -> float:
     """Return the curvature at a place, by the definition of the ramps."""
     ends = np.cumsum(way.lengths)
-    curvature = float(way.curvatures[int(np.searchsorted(ends[:-1], s))])
+    index = int(np.count_nonzero(ends[:-1] < s))
+    curvature = float(way.curvatures[index])
     for i, half in enumerate(way.ramps.tolist()):
         if abs(s - ends[i]) < half:
             u = (s - ends[i] + half) / (2 * half)
@@ -61,7 +62,7 @@ def integrated(way: Eased) -> FloatArray:
     ends = np.cumsum(way.lengths)
 
     def rate(s: float, at: FloatArray) -> list[float]:
-        sign = way.signs[min(np.searchsorted(ends, s), len(ends) - 1)]
+        sign = way.signs[int(np.count_nonzero(ends[:-1] < s))]
         course = at[2] + way.line
         return [
             sign * math.cos(course),

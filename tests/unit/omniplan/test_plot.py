@@ -245,7 +245,7 @@ def test_verdict_picture_shows_every_cell(
     shown = texts(figure)
     assert len(shown) == 4 * 3
     assert shown.count("not asked") == 2
-    assert shown.count("6.4 s") == 4
+    assert shown.count("6.40 s") == 4
     assert "steering range\nfront-left" in shown
     vehicles = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert vehicles == ["ackermann", "differential", "ift-four-steered", "mecanum"]

@@ -251,6 +251,16 @@ def test_a_stop_reached_exactly_keeps_the_configuration_before_it(flip: int) -> 
         assert validate(trajectory, space).valid
 
 
+def test_a_refused_part_that_begins_at_rest_tells_where_its_wheels_stand() -> None:
+    """It is not cut any further, and at rest itself the twist has no direction."""
+    space = rectangle((-60, 60), 180)
+    direction = complex(math.cos(1.75), math.sin(1.75))
+    report = validate(legs(1, direction, dwell=0.0), space)
+    assert limits(report) == {"STEER_RANGE", "RECONFIGURATION"}
+    (stop,) = chosen(legs(1, direction), space).standstills
+    assert abs(stop.change.goal[1]) == pytest.approx(1.75, abs=1e-3)
+
+
 def test_a_motion_that_never_moves_is_valid(space_of: SpaceOf) -> None:
     still = Trajectory.from_poses([0, 1, 2], np.ones((3, 3)))
     for name in ("ackermann", "differential", "ift-four-steered", "mecanum"):

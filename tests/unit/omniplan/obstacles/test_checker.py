@@ -301,3 +301,10 @@ def test_motions_without_places_are_refused() -> None:
     path = Path.from_poses([[0, 0, 0], [1, 0, 0]])
     with pytest.raises(InvalidTrajectory, match="no times"):
         checker.first_hit_of_trajectory(path)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_line_to_nowhere_is_told(bad: float) -> None:
+    checker = CollisionChecker(load_vehicle("mecanum"), wall())
+    with pytest.raises(InvalidInput, match=r"pose: .*; finite numbers"):
+        checker.is_line_clear(0.0, 0.0, bad, 1.0)

@@ -170,3 +170,8 @@ def test_open_and_broken_meshes_are_refused() -> None:
 def test_heights_must_be_in_order(heights: tuple[float, float]) -> None:
     with pytest.raises(InvalidInput, match=r"heights: .*the lower one first"):
         Obstacles.from_meshes([creation.box()], heights)
+
+
+def test_what_is_no_mesh_is_told() -> None:
+    with pytest.raises(InvalidInput, match=r"crate: 5; a trimesh\.Trimesh, or"):
+        Obstacles.from_meshes({"crate": 5}, (0.0, 1.0))  # type: ignore[dict-item]

@@ -145,3 +145,9 @@ def test_wrong_files_are_told(tmp_path: Path, text: str, words: str) -> None:
     assert "hall.json" in str(caught.value)
     with pytest.raises(InvalidInput, match="No such file"):
         Obstacles.from_json(tmp_path / "nowhere.json")
+
+
+@pytest.mark.parametrize("given", ["wall", None, 3.0])
+def test_what_is_no_collection_of_polygons_is_told(given: object) -> None:
+    with pytest.raises(InvalidInput, match="a list of polygons, or a mapping"):
+        Obstacles.from_polygons(given)  # type: ignore[arg-type]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path as FilePath
 
 import naive_limits
@@ -26,7 +27,10 @@ from omniplan import Path, Plan, PlanStatus, Trajectory, fastest, optimise, vali
 from omniplan.errors import InvalidTrajectory, NoPlanFound
 from omniplan.motion import PoseMotion
 from omniplan.obstacles import CollisionChecker, Obstacles
+from omniplan.optimising import repairing
+from omniplan.optimising.limits import rules_of
 from omniplan.optimising.measure import jerk_of
+from omniplan.optimising.pace import least_duration, top_rates
 from omniplan.optimising.problem import OptimisationProblem
 from omniplan.optimising.setting import Guess, Objective, Solution, SolverStatus
 from omniplan.optimising.warm_start import leg_through
@@ -285,13 +289,84 @@ def test_what_no_small_change_mends_is_refused_with_its_place(
     plan = optimise(sideways, ackermann, max_iterations=40, time=LONG)
     assert not plan.is_found
     assert plan.trajectory is None
-    assert plan.status in {
-        PlanStatus.INFEASIBLE,
-        PlanStatus.ITERATION_LIMIT,
-        PlanStatus.NOT_PROVED,
-    }
+    assert plan.status is PlanStatus.INFEASIBLE
     assert "sideways by ackermann" in plan.message
+    assert "40.0° permitted" in plan.message or "sideways slip" in plan.message
     assert plan.place is not None
+    # With stops and cusps there is a way, but it is another one.
+    anew = optimise(
+        sideways, ackermann, objective="change", max_iterations=40, time=LONG
+    )
+    assert_drivable(anew, ackermann)
+    assert anew.statistics["way"] == "plan"
+    assert "planned anew between the ends" in anew.message
+
+
+@pytest.mark.parametrize(
+    ("name", "motion", "objective", "text"),
+    [
+        (
+            "synchro-drive",
+            Path.from_poses([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]),
+            "time",
+            r"keeps its heading, and the goal's is \+57.3° off",
+        ),
+        (
+            "mecanum",
+            Trajectory.from_poses([0, 1], [[0, 0, 0], [3, 0, 0]]),
+            "smooth",
+            r"1 s are given, and at the wheels' largest speeds alone .* 2\.4",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told_at_once(
+    name: str, motion: Path | Trajectory, objective: Objective, text: str
+) -> None:
+    space = build_space(load_vehicle(name), cache=False)
+    plan = optimise(motion, space, objective=objective)
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert re.search(text, plan.message)
+    assert plan.statistics["solves"] == 0
+
+
+def test_a_vehicle_that_may_not_move_at_all_is_told() -> None:
+    """The axles of three wheels never meet, however they steer."""
+    wheels = [
+        {
+            "id": name,
+            "type": "steered",
+            "x": x,
+            "y": y,
+            "steering_range_deg": [middle - 1.0, middle + 1.0],
+            "max_speed": 1.0,
+        }
+        for name, x, y, middle in (
+            ("a", 0.0, 0.0, 0.0),
+            ("b", 0.5, 0.0, 90.0),
+            ("c", 0.0, 0.5, 45.0),
+        )
+    ]
+    stuck = vehicle_from_data({"name": "stuck", "wheels": wheels})
+    plan = optimise(line(), build_space(stuck, Grid(20, 36), cache=False))
+    assert plan.status is PlanStatus.INFEASIBLE
+    assert "no configuration of the wheels" in plan.message
+
+
+def test_no_motion_is_quicker_than_the_least_duration(
+    mecanum: PermissibleSpace, ackermann: PermissibleSpace
+) -> None:
+    for space in (mecanum, ackermann):
+        assert space.vehicle is not None
+        rules = rules_of(space.vehicle)
+        for goal in ([2.0, 0.5, 0.3], [3.0, 0.0, 0.0]):
+            path = Path.from_poses(np.array([[0.0, 0.0, 0.0], goal]))
+            found = optimise(path, space, objective="change", time=LONG)
+            quick = fastest(found.raise_for_status(), space).duration
+            assert 0 < least_duration(rules, np.array([[0, 0, 0], goal])) < quick
+    # Straight ahead at 1.2 m/s, were it not for starting and braking.
+    assert mecanum.vehicle is not None
+    speed, _ = top_rates(rules_of(mecanum.vehicle))
+    assert 1.2 <= speed < 1.2 * 1.03
 
 
 def test_without_time_the_timing_is_what_is_left(mecanum: PermissibleSpace) -> None:
@@ -365,7 +440,10 @@ def test_a_solver_that_lies_is_not_believed(
     objective: Objective,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It claims to have converged, to a motion too fast and through the pillar."""
+    """It claims to have converged, to a motion too fast and through the pillar.
+
+    So does the search for the nearest way, and there is no planner to help.
+    """
 
     def lie(problem: OptimisationProblem, start: Guess, **_: object) -> Solution:
         legs = []
@@ -380,6 +458,8 @@ def test_a_solver_that_lies_is_not_believed(
         )
 
     monkeypatch.setattr(OptimisationProblem, "solve", lie)
+    monkeypatch.setattr(repairing, "projected", lambda course, *_, **__: course)
+    monkeypatch.setattr(repairing.Repair, "planned", lambda _: None)
     obstacles = Obstacles.from_polygons(PILLAR)
     around = np.array([[-0.5, 0, 0], [0.3, 1.2, 0], [2.0, 1.2, 0], [3.0, 0, 0]])
     given = fastest(Path.from_poses(around), mecanum)
