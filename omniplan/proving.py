@@ -67,6 +67,7 @@ def prove(
     allow_unreachable: bool = False,
     longest: float | None = None,
     max_parts: int | None = None,
+    is_sharp: bool = True,
     like: Proved | None = None,
     checkpoint: Callable[[], None] | None = None,
 ) -> Proved:
@@ -82,6 +83,8 @@ def prove(
         No part is longer than this.
     max_parts : int, optional
         How many more parts than samples there may be; more limits may stay undecided.
+    is_sharp : bool
+        Whether the margin is to be sharp; without it the verdict comes sooner.
     like : Proved, optional
         Of the same trajectory at another speed: it is cut in the same way to begin
         with, which saves time where only `Proved.is_valid` is asked.
@@ -100,7 +103,7 @@ def prove(
     choice = choose_configurations(
         proof, judge, space, tolerances, allow_unreachable=allow_unreachable
     )
-    if like is None:
+    if is_sharp and like is None:
         proof.sharpen(choice.sign_of)
     if longest is not None:
         proof.refine(lambda parts: parts.spans.t1 - parts.spans.t0 > longest)

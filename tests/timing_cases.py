@@ -37,6 +37,16 @@ def demanding_vehicle(rng: np.random.Generator, kind: VehicleKind) -> Vehicle:
     return vehicle_from_data(data)
 
 
+def swinging_vehicle(rng: np.random.Generator, kind: VehicleKind) -> Vehicle:
+    """A random vehicle all of whose steered wheels have steering accelerations."""
+    data = demanding_vehicle(rng, kind).model_dump(mode="json", exclude_none=True)
+    for wheel in data["wheels"]:
+        if wheel["type"] in {"steered", "turntable"}:
+            rate = float(rng.uniform(100, 1000))
+            wheel.setdefault("max_steering_acceleration_deg", rate)
+    return vehicle_from_data(data)
+
+
 def smooth_path(rng: np.random.Generator, n: int = 6) -> Path:
     """A path whose direction and heading wander, without stops."""
     course = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.uniform(-0.4, 0.4, n))

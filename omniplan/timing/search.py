@@ -20,7 +20,7 @@ from omniplan.standing.ways import Changer
 from omniplan.timing.caps import cap_use
 from omniplan.timing.path_motion import PathMotion, PathPiece
 from omniplan.timing.result import SpeedProfile, Timing, TimingStatus
-from omniplan.timing.sampling import sample_piece
+from omniplan.timing.sampling import PieceSampler, SampledPiece
 from omniplan.timing.shape import PieceShape, first_fault, shape_of
 from omniplan.timing.solver import PieceProfile, TimingProblem
 from omniplan.timing.tightening import any_is_tight, slowdowns_of, tightened
@@ -33,21 +33,28 @@ __all__ = ["Timer"]
 FloatArray = npt.NDArray[np.float64]
 Array = TypeVar("Array", npt.NDArray[np.float64], npt.NDArray[np.int64])
 
-PER_POSE = 2
-"""Least number of samples between two poses of the path."""
+PER_POSE = 1
+"""Least number of steps between two poses of the path."""
+CAPPED = 8
+"""So many times more steps where caps have to be kept between samples."""
 DWELL = 1e-4
 """Time at every stop, s, so that its pose is repeated and the stop cannot be missed."""
 LOSS = 5e-3
 """If a trajectory takes longer than the optimum by more than this share ..."""
-REFINEMENTS = (1, 1, 1, 1, 1, 1, 2, 2)
-"""... it is timed again, slower where a limit was found broken, and sampled more
-finely, so many times ..."""
-PATIENCE = 3
-"""... unless it got no faster so often in a row."""
-AROUND = 3
+TRIES = 8
+"""... it is timed again, slower where a limit was found broken, so many times ..."""
+PATIENCE, GAIN = 3, 1e-3
+"""... unless so many more gained less than this share of time."""
+AROUND = 1
 """So many steps before and after such a place are passed more slowly, too."""
+STARTING = 0.01
+"""... and of the time since rest, or until it, up to this, s, as much."""
+AT_REST = 1.05
+"""There limits on α̈ are known least, and a slower start costs next to nothing."""
 PARTS = 20_000
 """How many parts a trajectory may be halved into until it is known well enough."""
+SCALINGS, SPARE = 3, 1e-4
+"""How often a trajectory is slowed down as a whole, by this share more than asked."""
 CANDIDATES = 2
 """How many of the trajectories are proved until one is."""
 WAITS = 3
@@ -86,6 +93,7 @@ class _Try:
     """Its speed factor is what the margins promise."""
     slowdowns: FloatArray
     """How many times more slowly every part had to be passed."""
+    legs: list[_Leg]
 
     @property
     def estimate(self) -> float:
@@ -156,23 +164,32 @@ class Timer:
             return self._no(path, NO_WAY, choice)
         chosen, waits = choice
         profile = _joined(problem, chosen, waits, self._wheel_ids)
-        tight = [np.ones(one.u.size) for one in chosen]
+        samplers = [
+            PieceSampler(problem, k, one, self._steps_of(problem.pieces[k]))
+            for k, one in zip(numbers, chosen, strict=True)
+        ]
+        weights = [np.ones(sampler.u.size) for sampler in samplers]
+        sampled = [sampler.sampled() for sampler in samplers]
         tries: list[_Try] = []
-        for finer in REFINEMENTS:
-            legs = self._legs(problem, numbers, chosen, waits, tight, finer)
-            one = self._tried(_trajectory(path, legs), legs, chosen)
+        for _ in range(TRIES):
+            one = self._tried(path, sampled, waits, chosen)
             tries.append(one)
+            profile = _joined(problem, chosen, waits, self._wheel_ids)
             if _is_enough(tries, profile.duration):
                 break
-            if not one.is_mendable or (one.report.valid and not any_is_tight(tight)):
+            if not one.is_mendable or (one.report.valid and not any_is_tight(weights)):
                 break
-            self._tighten(tight, legs, chosen, one)
+            for i, (sampler, leg) in enumerate(zip(samplers, one.legs, strict=True)):
+                weight = _tighter(weights[i], sampler, leg, one)
+                if (weight != weights[i]).any():
+                    weights[i], sampled[i] = weight, sampler.sampled(weight)
         tries.sort(key=lambda one: one.estimate)
-        timing = self._proved(path, tries[0], profile)
+        timing = self._proved(path, tries[0], chosen, profile)
         for one in tries[1:CANDIDATES]:
             if timing.duration is not None and timing.duration <= one.estimate:
                 break
-            timing = min(timing, self._proved(path, one, profile), key=_worth)
+            again = self._proved(path, one, chosen, profile)
+            timing = min(timing, again, key=_worth)
         return timing
 
     @property
@@ -241,46 +258,49 @@ class Timer:
         _, signs, waits = min(best.values(), key=lambda some: some[0])
         return [option[s] for option, s in zip(options, signs, strict=True)], waits
 
-    def _legs(
-        self,
-        problem: TimingProblem,
-        numbers: range,
-        chosen: list[PieceProfile],
-        waits: list[float],
-        tight: list[FloatArray],
-        finer: int,
-    ) -> list[_Leg]:
-        """Return the samples of all pieces, slower where a piece breaks limits."""
+    def _steps_of(self, piece: PathPiece) -> int:
+        has_caps = bool(np.isfinite([piece.max_speed, piece.max_yaw_rate]).any())
+        least = self._steps * (CAPPED if has_caps else 1)
+        return max(least, PER_POSE * (piece.u.size - 1))
+
+    def _legs(self, sampled: list[SampledPiece], waits: list[float]) -> list[_Leg]:
+        """Return the samples of all pieces with the time at stops between them."""
+        assert self._space.vehicle is not None
+        footprint = self._space.vehicle.footprint
         legs, now = [], 0.0
-        for k, profile, wait, weight in zip(
-            numbers, chosen, [*waits, 0.0], tight, strict=True
-        ):
-            knots = problem.pieces[k].u.size
-            steps = max(self._steps * finer, PER_POSE * (knots - 1))
-            sampled = sample_piece(problem, k, profile, steps, weight)
-            poses = sampled.path.poses_at(sampled.u)
-            vehicle = self._space.vehicle
-            footprint = () if vehicle is None else vehicle.footprint
-            used = cap_use(sampled.t, sampled.u, sampled.path, poses, footprint)
-            t = now + sampled.t * max(sampled.excess, used, 1.0)
-            legs.append(_Leg(sampled.path, t, sampled.u))
+        for one, wait in zip(sampled, [*waits, 0.0], strict=True):
+            poses = one.path.poses_at(one.u)
+            used = cap_use(one.t, one.u, one.path, poses, footprint)
+            t = now + one.t * max(one.excess, used, 1.0)
+            legs.append(_Leg(one.path, t, one.u))
             now = float(t[-1]) + wait * (1 + 1e-6) + DWELL
         return legs
 
     def _tried(
+        self,
+        path: Path,
+        sampled: list[SampledPiece],
+        waits: list[float],
+        chosen: list[PieceProfile],
+    ) -> _Try:
+        """Return a trajectory as it was judged; waits grow as it demands."""
+        legs = self._legs(sampled, waits)
+        one = self._weighed(_trajectory(path, legs), legs, chosen)
+        for _ in range(WAITS):
+            if not _lengthened(waits, one):
+                break
+            legs = self._legs(sampled, waits)
+            one = self._weighed(_trajectory(path, legs), legs, chosen)
+        return one
+
+    def _weighed(
         self, trajectory: Trajectory, legs: list[_Leg], chosen: list[PieceProfile]
     ) -> _Try:
-        """Return a trajectory as it was judged, with waits as long as it demands."""
         proved, report = self._judged(trajectory)
-        for _ in range(WAITS):
-            if not _waits_only(report):
-                break
-            trajectory = _with_longer_waits(proved.trajectory, report)
-            proved, report = self._judged(trajectory)
         spans, starts = proved.parts.spans, [leg.t[0] for leg in legs]
         leg = np.searchsorted(starts, (spans.t0 + spans.t1) / 2, side="right") - 1
         sign = np.array([one.sigma for one in chosen], dtype=np.int64)[leg]
-        return _Try(proved, report, slowdowns_of(proved, sign))
+        return _Try(proved, report, slowdowns_of(proved, sign), legs)
 
     def _judged(self, trajectory: Trajectory) -> tuple[Proved, Report]:
         proved = prove(
@@ -289,33 +309,32 @@ class Timer:
             self._tolerances,
             allow_unreachable=self._allow_unreachable,
             max_parts=PARTS,
+            is_sharp=False,
         )
         return proved, report_of(proved)
 
-    def _tighten(
+    def _proved(
         self,
-        tight: list[FloatArray],
-        legs: list[_Leg],
-        chosen: list[PieceProfile],
+        path: Path,
         one: _Try,
-    ) -> None:
-        """Make the limits tighter where they were broken, looser where they are not."""
-        spans, asked = one.proved.parts.spans, one.slowdowns
-        for i, (leg, profile) in enumerate(zip(legs, chosen, strict=True)):
-            pad = AROUND * float(leg.t[-1] - leg.t[0]) / self._steps
-            times = np.interp(profile.u, leg.u, leg.t)
-            tight[i] = tightened(tight[i], times, (spans.t0, spans.t1), asked, pad)
-
-    def _proved(self, path: Path, one: _Try, profile: SpeedProfile) -> Timing:
-        """Return the timing once `validate` has accepted it, slower if need be."""
+        chosen: list[PieceProfile],
+        profile: SpeedProfile,
+    ) -> Timing:
+        """Return the timing once it has been proved, slower if need be."""
+        for _ in range(SCALINGS):
+            if one.report.valid or not math.isfinite(one.estimate):
+                break
+            trajectory = one.proved.trajectory
+            factor = trajectory.duration / one.estimate * (1 - SPARE)
+            legs = [replace(leg, t=leg.t / factor) for leg in one.legs]
+            one = self._weighed(trajectory.scaled(factor), legs, chosen)
         trajectory, report = one.proved.trajectory, one.report
         if not report.valid:
             report = self._validate(trajectory)
-        if not report.valid and report.speed_factor > 0:
+            if report.speed_factor <= 0:
+                return self._refused(path, profile, report)
             # A factor in a report has been proved by validating again.
             trajectory = trajectory.scaled(report.speed_factor)
-        elif not report.valid:
-            return self._refused(path, profile, report)
         message = (
             f"{path.name} by {self._space.name}: {trajectory.duration:.3f} s, "
             f"the optimum is {profile.duration:.3f} s"
@@ -359,13 +378,39 @@ def _trajectory(path: Path, legs: list[_Leg]) -> Trajectory:
     )
 
 
+def _tighter(
+    weight: FloatArray, sampler: PieceSampler, leg: _Leg, one: _Try
+) -> FloatArray:
+    """Return tighter limits where they were broken, looser where they are not."""
+    spans = one.proved.parts.spans
+    asked = one.slowdowns
+    middle = (spans.t0 + spans.t1) / 2
+    starts = np.minimum(abs(middle - leg.t[0]), abs(middle - leg.t[-1])) < STARTING
+    asked = np.where(starts & (asked > 1), np.maximum(asked, AT_REST), asked)
+    times = np.interp(sampler.u, leg.u, leg.t)
+    gaps = np.diff(times, append=times[-1:], prepend=times[:1])
+    pad = np.maximum(AROUND * sampler.steps_at(times), np.maximum(gaps[1:], gaps[:-1]))
+    # A start is passed more slowly as a whole, not moment by moment.
+    since = np.minimum(times - leg.t[0], leg.t[-1] - times)
+    pad = np.where(since < STARTING, np.maximum(pad, since), pad)
+    return tightened(
+        weight,
+        times,
+        (spans.t0, spans.t1),
+        asked,
+        pad,
+        loosens=one.report.valid,
+    )
+
+
 def _is_enough(tries: list[_Try], optimum: float) -> bool:
     """Return whether more tries are not worth their time."""
     worth = [one.estimate for one in tries]
-    best = int(np.argmin(worth))
-    if tries[best].report.valid and worth[best] < (1 + LOSS) * optimum:
+    best = min(worth)
+    if best < (1 + LOSS) * optimum:
         return True
-    return len(tries) - 1 - best >= PATIENCE and math.isfinite(worth[best])
+    before = min(worth[:-PATIENCE], default=math.inf)
+    return math.isfinite(before) and best > before * (1 - GAIN)
 
 
 def _worth(timing: Timing) -> float:
@@ -415,18 +460,17 @@ def _locked(values: Array) -> Array:
     return values
 
 
-def _waits_only(report: Report) -> bool:
-    """Return whether longer waits at stops may mend a trajectory."""
-    return bool(report.violations) and all(
-        v.limit == "RECONFIGURATION" and v.value is not None for v in report.violations
-    )
-
-
-def _with_longer_waits(trajectory: Trajectory, report: Report) -> Trajectory:
-    """Return the trajectory with the waits that a report demands."""
-    for violation in reversed(report.violations):  # so that rows keep their numbers
-        assert violation.value is not None
-        row = int(np.abs(trajectory.t - violation.t).argmin())
-        wait = max(violation.value - violation.bound, 0.0) * (1 + 1e-6) + DWELL
-        trajectory = trajectory.with_dwell(row, wait)
-    return trajectory
+def _lengthened(waits: list[float], one: _Try) -> bool:
+    """Make waits at stops as long as a report demands; return whether any is."""
+    ends = np.array([leg.t[-1] for leg in one.legs[:-1]])
+    grew = False
+    for violation in one.report.violations:
+        if violation.limit != "RECONFIGURATION" or violation.value is None:
+            continue
+        since = np.where(ends <= violation.t_end, violation.t_end - ends, math.inf)
+        missing = violation.value - violation.bound
+        if not np.isfinite(since).any() or not 0 < missing < math.inf:
+            continue
+        waits[int(since.argmin())] += missing + DWELL
+        grew = True
+    return grew

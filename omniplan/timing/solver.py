@@ -71,6 +71,7 @@ class TimingProblem:
         vehicle: Vehicle,
         grid: int = GRID,
         finer: Sequence[IntArray | None] | None = None,
+        per_knot: int = PER_KNOT,
     ) -> None:
         """Lay a grid over every piece.
 
@@ -82,9 +83,11 @@ class TimingProblem:
             Least number of intervals per piece.
         finer : sequence of (n,) int, ≥ 1, optional
             Of every piece into how many each of its intervals is cut; None: into one.
+        per_knot : int
+            Least number of intervals between two knots of a piece.
         """
         self.pieces = tuple(pieces)
-        self._vehicle, self._grid = vehicle, grid
+        self._vehicle, self._grid, self._per_knot = vehicle, grid, per_knot
         speeds = np.concatenate([p.max_speed for p in pieces])
         yaw_rates = np.concatenate([p.max_yaw_rate for p in pieces])
         self._caps = np.stack([speeds, yaw_rates])
@@ -105,7 +108,10 @@ class TimingProblem:
         self._point = np.array([p.point for p in pieces], dtype=np.complex128)
         self._offsets = np.cumsum([0, *(p.u.size - 1 for p in pieces)])
         cuts: Sequence[IntArray | None] = finer or [None] * len(pieces)
-        grids = [_cut(_grid(p, grid), cut) for p, cut in zip(pieces, cuts, strict=True)]
+        grids = [
+            _cut(_grid(p, grid, per_knot), cut)
+            for p, cut in zip(pieces, cuts, strict=True)
+        ]
         knots, h0, h1 = zip(*grids, strict=True)
         self._knot = np.concatenate(
             [k + offset for k, offset in zip(knots, self._offsets, strict=False)]
@@ -115,17 +121,19 @@ class TimingProblem:
         self._u = np.concatenate([self._nodes(k) for k in range(len(pieces))])
         self._most_nodes = int(np.diff(self._first).max()) + 1
 
-    def rounded(self, piece: int, reach: FloatArray) -> TimingProblem:
+    def rounded(self, piece: int, reach: FloatArray, stairs: IntArray) -> TimingProblem:
         """Return the problem of one piece without jumps of its third derivative.
 
         Parameters
         ----------
         piece : int
         reach : (k - 2,) float, m
-            How far about every inner knot, as of `omniplan.timing.rounding.rounded`.
+        stairs : (k - 2,) int
+            How far about every inner knot, and in how many steps, as of
+            `omniplan.timing.rounding.rounded`.
         """
-        given = rounded(self.pieces[piece], reach)
-        return TimingProblem([given], self._vehicle, self._grid)
+        given = rounded(self.pieces[piece], reach, stairs)
+        return TimingProblem([given], self._vehicle, self._grid, per_knot=1)
 
     def refined(self, profiles: Sequence[Sequence[PieceProfile]]) -> TimingProblem:
         """Return the problem on a finer grid where much time is spent in an interval.
@@ -141,7 +149,9 @@ class TimingProblem:
         finer = [_cuts_of(some, self._grid) for some in profiles]
         if all(cuts is None for cuts in finer):
             return self
-        return TimingProblem(self.pieces, self._vehicle, self._grid, finer)
+        return TimingProblem(
+            self.pieces, self._vehicle, self._grid, finer, self._per_knot
+        )
 
     @cached_property
     def _swinging(self) -> tuple[tuple[complex, float], ...]:
@@ -163,31 +173,48 @@ class TimingProblem:
         """Whether third derivatives of the samples' splines matter."""
         return bool(self._swinging)
 
-    def steering_gain(self, piece: int, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the largest |α'| and 1 / |g|, each by how much α̈ counts, (n,).
+    def farthest_from(self, point: complex) -> float:
+        """Return how far from a point of the body the wheels are whose α̈ counts, m."""
+        return max((abs(place - point) for place, _ in self._swinging), default=0.0)
 
-        g is the velocity of a wheel per u̇ and α' how fast it turns per u: what α̈ is
-        per ü, s²/m, and per third derivative of the path over u̇, s² .
+    def steering_gain(self, piece: int, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return by how much α̈ is off where poses are, at places u, (n,) each.
+
+        Of splines in time through poses the third derivatives are off by shares of
+        ``p'' u̇ u⃛`` and ``θ'' u̇ u⃛``, in the world frame. What that makes of a wheel's
+        ``α̈ = Im(g'' ḡ)/|g|² + ...`` is the first, s²/m; the second is ``1 / |g|``, g
+        being a wheel's velocity per u̇, s². Both are over the limit on α̈, and the
+        largest of any wheel.
 
         Parameters
         ----------
         u : (n,) float, m
         """
         given = self.pieces[piece]
-        h = 1e-5 * given.length
-        at = np.clip(u, given.u[0] + 2 * h, given.u[-1] - 2 * h)
-        x, y, theta = np.moveaxis(
-            given.poses_at((at + h * np.arange(-2, 3)[:, None]).ravel()), 1, 0
-        ).reshape(3, 5, -1)
+        knot = np.searchsorted(given.u, u, side="right") - 1
+        knot = np.clip(knot, 0, given.u.size - 2)
+        h = u - given.u[knot]
+        theta = given.poses_at(u)[:, 2]
+        a, b, c, _ = given.position[:, knot]
+        a_t, b_t, c_t, _ = given.heading[:, knot]
+        turned = np.exp(-1j * theta)
+        along, bend = (3 * a * h + 2 * b) * h + c, 6 * a * h + 2 * b
+        along, bend = along * turned, bend * turned
+        spin, spin_up = (3 * a_t * h + 2 * b_t) * h + c_t, 6 * a_t * h + 2 * b_t
         turning, lever = np.zeros(u.shape), np.zeros(u.shape)
         for point, weight in self._swinging:
-            place = x + 1j * y + np.exp(1j * theta) * (point - given.point)
-            g = (place[2:] - place[:-2]) * np.exp(-1j * theta[1:-1]) / (2 * h)
-            size = np.maximum(np.abs(g[1]), LEAST_PACE)
-            swing = np.abs(np.angle(g[2] * g[0].conj())) / (2 * h)
+            arm = 1j * (point - given.point)
+            g = along + spin * arm
+            size = np.maximum(np.abs(g), LEAST_PACE)
+            swing = np.abs(((bend + spin_up * arm) * g.conj()).imag) / size**2
             turning = np.maximum(turning, weight * swing)
             lever = np.maximum(lever, weight / size)
         return turning, lever
+
+    def is_ramp(self, profile: PieceProfile) -> bool:
+        """Return whether the bound on |ü| alone holds a profile back somewhere."""
+        last = len(self.rows) - 1
+        return bool(((profile.row == last) & (profile.share > 1 - 1e-6)).any())
 
     def nodes(self, piece: int) -> FloatArray:
         """Return the grid of a piece, (n,) m from the start of the path."""
@@ -342,14 +369,16 @@ def _cut(
     return knot, first, last
 
 
-def _grid(piece: PathPiece, least: int) -> tuple[IntArray, FloatArray, FloatArray]:
+def _grid(
+    piece: PathPiece, least: int, per_knot: int
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the polynomial of every grid interval and its ends on it.
 
     Towards both ends of a piece the intervals halve, as it starts and ends at rest:
     ü is taken as constant over each.
     """
     span = np.diff(piece.u)
-    count = np.maximum(np.ceil(least * span / piece.length - 1e-9), PER_KNOT)
+    count = np.maximum(np.ceil(least * span / piece.length - 1e-9), per_knot)
     count = count.astype(np.int64)
     knot = np.repeat(np.arange(span.size), count)
     place = np.arange(knot.size) - np.repeat(np.cumsum(count) - count, count)

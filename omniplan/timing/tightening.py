@@ -22,6 +22,8 @@ SignArray = npt.NDArray[np.int64]
 
 SPARE = 1e-3
 """By this share more than was asked for a place is passed more slowly ..."""
+MORE = 1.3
+"""... and by this much more than is missing, as samples move, ..."""
 MOST = 1.25
 """... but at most so many times more slowly at once ..."""
 LEAST = 0.9
@@ -61,7 +63,9 @@ def tightened(
     times: FloatArray,
     spans: tuple[FloatArray, FloatArray],
     slowdowns: FloatArray,
-    pad: float,
+    pad: FloatArray,
+    *,
+    loosens: bool,
 ) -> FloatArray:
     """Return by how much the limits are to be tightened at every node of a profile.
 
@@ -75,8 +79,10 @@ def tightened(
         Start and end of the parts, one after the other.
     slowdowns : (m,) float
         What the parts ask for.
-    pad : float, s
+    pad : (n,) float, s
         Parts so near to a node count.
+    loosens : bool
+        Whether limits are loosened that are kept with room to spare.
     """
     first = np.searchsorted(spans[1], times - pad)
     last = np.searchsorted(spans[0], times + pad, side="right")
@@ -84,9 +90,11 @@ def tightened(
     ends = np.stack([first, np.maximum(last, first + 1)], axis=1).ravel()
     padded = np.append(slowdowns, 0.0)  # an end may be just after the last part
     asked = np.maximum.reduceat(padded, ends)[::2] * (1 + SPARE)
+    asked = np.where(asked > 1, 1 + (asked - 1) * MORE, asked)
     relaxed = np.maximum(np.sqrt(np.minimum(asked, 1.0)), LEAST)
+    relaxed = relaxed if loosens else np.ones_like(asked)
     # What is just kept stays as it is.
-    change = np.where(asked > 1 + SPARE, np.minimum(asked, MOST), relaxed)
+    change = np.where(asked > 1 + SPARE * MORE, np.minimum(asked, MOST), relaxed)
     return np.asarray(np.maximum(weight * change, 1.0))
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import naive_timing
 import numpy as np
+import pytest
 import random_motions
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from timing_cases import demanding_vehicle, smooth_path
+from timing_cases import demanding_vehicle, smooth_path, swinging_vehicle
 
 from configspace import Grid, PermissibleSpace, build_space
 from configspace.testing import VehicleKind
@@ -67,6 +68,39 @@ def test_what_is_found_is_proved_and_what_is_not_says_where(
     some = timing.trajectory.samples[:: max(len(timing.trajectory.samples) // 50, 1)]
     gap = np.abs(some[:, None] - dense[None]).max(axis=-1).min(axis=1)
     assert gap.max() < 0.01
+
+
+SWINGING: tuple[VehicleKind, ...] = ("steered", "offset", "turntable")
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        (21, 116, 214),
+        pytest.param(
+            tuple(range(240)), marks=[pytest.mark.slow, pytest.mark.timeout(3600)]
+        ),
+    ],
+)
+def test_steering_accelerations_cost_less_than_one_per_cent(
+    seeds: tuple[int, ...],
+) -> None:
+    """Of the optimum's time, whose own third derivatives may jump."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        vehicle = swinging_vehicle(rng, SWINGING[seed % 3])
+        space = build_space(vehicle, Grid(20, 36), cache=False)
+        path: Path | Trajectory = smooth_path(rng)
+        if seed % 4 == 3:
+            path = random_motions.random_poses(rng, vehicle, space)
+        timing = time_path(path, space)
+        if timing.status is TimingStatus.BLOCKED:
+            continue
+        assert timing.trajectory is not None, (seed, timing.message)
+        assert timing.profile is not None
+        assert validate(timing.trajectory, space).valid, seed
+        share = timing.trajectory.duration / timing.profile.duration
+        assert 0.99 < share < 1.01, (seed, share)
 
 
 @settings(max_examples=4, deadline=None, derandomize=True)

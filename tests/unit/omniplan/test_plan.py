@@ -411,7 +411,7 @@ try:
         (0, 0, 0), (4.5, 0, 0), space, wall, time=600, planner="RRTstar"
     )
 except KeyboardInterrupt:
-    again = omniplan.plan((0, 0, 0), (4.5, 0, 0), space, wall, iterations=20, time=600)
+    again = omniplan.plan((0, 0, 0), (4.5, 0, 0), space, wall, iterations=300, time=60)
     print("ends", again.status.name)
 """
 

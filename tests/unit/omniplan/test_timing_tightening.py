@@ -12,6 +12,7 @@ from omniplan import Trajectory, validate
 from omniplan.proving import prove
 from omniplan.timing.tightening import (
     LEAST,
+    MORE,
     MOST,
     SPARE,
     any_is_tight,
@@ -31,15 +32,19 @@ def mecanum() -> PermissibleSpace:
     return build_space(vehicle, Grid(20, 36), cache=False)
 
 
-def weights(asked: FloatArray, before: float = 1.0, pad: float = 0.4) -> FloatArray:
-    return tightened(np.full(11, before), TIMES, SPANS, asked, pad)
+def weights(
+    asked: FloatArray, before: float = 1.0, pad: float = 0.4, *, loosens: bool = True
+) -> FloatArray:
+    pads = np.full(11, pad)
+    return tightened(np.full(11, before), TIMES, SPANS, asked, pads, loosens=loosens)
 
 
 def test_only_what_is_near_is_tightened() -> None:
     asked = np.full(10, 0.9)
     asked[4] = 1.1  # from 4 s to 5 s
     found = weights(asked)
-    np.testing.assert_allclose(found[[4, 5]], 1.1 * (1 + SPARE))
+    more = 1 + (1.1 * (1 + SPARE) - 1) * MORE
+    np.testing.assert_allclose(found[[4, 5]], more)
     np.testing.assert_array_equal(np.delete(found, [4, 5]), 1.0)
     np.testing.assert_array_equal(
         np.flatnonzero(weights(asked, pad=1.4) > 1), [3, 4, 5, 6]
@@ -57,6 +62,7 @@ def test_what_is_just_kept_stays_and_what_has_room_is_loosened() -> None:
         1.2 * np.sqrt(0.9 * (1 + SPARE))
     )
     assert weights(np.full(10, 0.9), before=1.01).tolist() == [1.0] * 11
+    assert weights(np.full(10, 0.9), before=1.2, loosens=False).tolist() == [1.2] * 11
 
 
 def test_tight_is_more_than_one() -> None:

@@ -286,7 +286,7 @@ def test_what_no_small_change_mends_is_refused_with_its_place(
     ackermann: PermissibleSpace,
 ) -> None:
     sideways = Path.from_poses([[0, 0, 0], [0, 1, 0]], name="sideways")
-    plan = optimise(sideways, ackermann, max_iterations=40, time=LONG)
+    plan = optimise(sideways, ackermann, intervals=12, max_iterations=20, time=LONG)
     assert not plan.is_found
     assert plan.trajectory is None
     assert plan.status is PlanStatus.INFEASIBLE
@@ -295,7 +295,12 @@ def test_what_no_small_change_mends_is_refused_with_its_place(
     assert plan.place is not None
     # With stops and cusps there is a way, but it is another one.
     anew = optimise(
-        sideways, ackermann, objective="change", max_iterations=40, time=LONG
+        sideways,
+        ackermann,
+        objective="change",
+        intervals=12,
+        max_iterations=20,
+        time=LONG,
     )
     assert_drivable(anew, ackermann)
     assert anew.statistics["way"] == "plan"
