@@ -271,13 +271,16 @@ def turning(
 def one_way(part: Enclosure, chord: Chord, change: Change) -> BoolArray:
     """Return whether the direction of U surely never turns back over a part.
 
-    ``Im(U̇ Ū)`` keeps its sign if both ends together exceed what it may change by.
+    ``Im(U̇ Ū)`` keeps its sign if both ends together exceed what it may change by. In a
+    turn on the spot, with v = 0 all along, U keeps to one line through zero.
     """
     first, last = (
         (d * u.conj()).imag for u, d in ((chord.a, change.a), (chord.b, change.b))
     )
     may_change = part.dt * change.bend * chord.far
-    return np.asarray((chord.near > 0) & (np.abs(first + last) >= may_change))
+    on_line = (part.v0 == 0) & (part.v1 == 0) & (part.v_ddot == 0)
+    is_kept = on_line | (np.abs(first + last) >= may_change)
+    return np.asarray((chord.near > 0) & is_kept)
 
 
 def growth_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:

@@ -212,9 +212,9 @@ def _worded(violation: Violation, more: int) -> str:
         value, bound = (
             quantity(x, violation.unit) for x in (violation.value, violation.bound)
         )
-        numbers = f" {value}, permitted {bound}"
+        numbers = f": {value}, permitted {bound}"
     others = f" (and {more} more)" if more else ""
-    return f"{what}{who}:{numbers} at t = {violation.t:.2f} s{others}"
+    return f"{what}{who}{numbers} at t = {violation.t:.2f} s{others}"
 
 
 def telling_wheels(drive: Drive, report: Report, number: int) -> list[int]:

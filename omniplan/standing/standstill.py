@@ -184,7 +184,7 @@ def choose_configurations(
     return Choice(
         best.signs,
         _standstills(best, changer, judge),
-        _anchors(best, parts, pieces) if wheels else (),
+        _anchors(best) if wheels else (),
         _apart(parts, pieces, best.signs, judge, lost),
     )
 
@@ -440,17 +440,18 @@ def _standstills(
     return tuple(found)
 
 
-def _anchors(best: _Label, parts: Parts, pieces: Sequence[Piece]) -> tuple[Anchor, ...]:
-    """Return where the winding wheels stand at the start of every piece."""
-    angles = []
+def _anchors(best: _Label) -> tuple[Anchor, ...]:
+    """Return where the winding wheels stand where every piece starts."""
+    times, angles = [], []
     for track in best.tracks:
         turns, _ = track.unwound()
-        starts = [step.sweep.start for step in track.line()]
-        angles.append([s + 2 * np.pi * k for s, k in zip(starts, turns, strict=True)])
-    return tuple(
-        Anchor(float(parts.spans.t0[piece.first]), tuple(each[i] for each in angles))
-        for i, piece in enumerate(pieces)
-    )
+        sweeps = [step.sweep for step in track.line()]
+        times.append([sweep.t for sweep in sweeps])
+        angles.append(
+            [s.start + 2 * np.pi * k for s, k in zip(sweeps, turns, strict=True)]
+        )
+    pieces = zip(zip(*times, strict=True), zip(*angles, strict=True), strict=True)
+    return tuple(Anchor(*piece) for piece in pieces)
 
 
 def _apart(

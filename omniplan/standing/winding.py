@@ -50,6 +50,8 @@ class Sweep:
     """Never further below the start than this, ≤ 0."""
     high: float = 0.0
     """Never further above the start than this, ≥ 0."""
+    t: float = 0.0
+    """The moment of the start, s; of a way at a standstill 0."""
 
     def opposite(self) -> Sweep:
         """Return the sweep of the other representation: the wheel half a turn on."""
@@ -58,12 +60,12 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Anchor:
-    """Where the winding wheels stand at one moment of a piece."""
+    """Where the winding wheels of a piece stand at one moment each."""
 
-    t: float
-    """An end of a part, s."""
+    times: tuple[float, ...]
+    """Of every winding wheel, s: where a part starts over which it is followed."""
     angles: tuple[float, ...]
-    """Followed steering angle of every winding wheel, rad."""
+    """Followed steering angle of every winding wheel at its moment, rad."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +90,29 @@ class _Course:
         headings = (np.angle(part.sign * u) for u in (chord.a, chord.b))
         return cls(start, end, chord.spread(), chord.near <= 0, *headings)
 
-    def sweep(self, piece: Piece) -> Sweep:
+    def rows(self, piece: Piece) -> slice:
+        """Return the parts from the first to the last over which it is followed.
+
+        A part that begins or ends at rest may be among those of the piece if another
+        limit is broken there. Of zero there is no direction.
+        """
         rows = slice(piece.first, piece.last + 1)
-        origin = self.start[piece.first]
+        known = np.flatnonzero(~self.lost[rows])
+        if not known.size:
+            return rows
+        return slice(piece.first + int(known[0]), piece.first + int(known[-1]) + 1)
+
+    def sweep(self, piece: Piece, t0: FloatArray) -> Sweep:
+        """Return the sweep over a piece; `t0` (m,) are the starts of the parts."""
+        rows = self.rows(piece)
+        origin = self.start[rows.start]
         start, end = self.start[rows] - origin, self.end[rows] - origin
         return Sweep(
-            start=float(self.heading0[piece.first]),
+            start=float(self.heading0[rows.start]),
             turn=float(end[-1]),
             low=float((np.minimum(start, end) - self.spread[rows]).min()),
             high=float((np.maximum(start, end) + self.spread[rows]).max()),
+            t=float(t0[rows.start]),
         )
 
 
@@ -113,7 +129,8 @@ def sweeps_of(
     wheels : sequence of WindingWheel
     """
     courses = [_Course.of(parts.enclosure, wheel) for wheel in wheels]
-    return [tuple(course.sweep(piece) for course in courses) for piece in pieces]
+    t0 = parts.spans.t0
+    return [tuple(course.sweep(piece, t0) for course in courses) for piece in pieces]
 
 
 def joined(sweeps: Iterable[Sweep]) -> Sweep:
@@ -128,6 +145,7 @@ def joined(sweeps: Iterable[Sweep]) -> Sweep:
             whole.turn + sweep.turn,
             min(whole.low, whole.turn + sweep.low),
             max(whole.high, whole.turn + sweep.high),
+            whole.t,
         )
     return whole or Sweep(0.0)
 
@@ -149,7 +167,7 @@ def unsettled(parts: Parts, wheels: Sequence[WindingWheel]) -> BoolArray:
         least = np.minimum(course.start, course.end)
         largest = np.maximum(course.start, course.end)
         for piece in parts.pieces():
-            rows = slice(piece.first, piece.last + 1)
+            rows = course.rows(piece)
             allowed = RESOLUTION * wheel.half
             beyond = largest[rows] + course.spread[rows] - largest[rows].max()
             below = least[rows].min() - least[rows] + course.spread[rows]
@@ -192,7 +210,7 @@ def wound(
         known = ~parts.stands
         shift = np.zeros(flip.shape)
         for p, anchor in enumerate(anchors):
-            at = int(np.searchsorted(parts.spans.t0, anchor.t))
+            at = int(np.searchsorted(parts.spans.t0, anchor.times[i]))
             here = piece == p
             shift[here] = anchor.angles[i] - course.start[at]
             # Past the centre of rotation on the wheel the angle is not known.

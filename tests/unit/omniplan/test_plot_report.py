@@ -118,8 +118,10 @@ def test_three_pictures_are_written(
 def test_violations_are_numbered_alike_in_all_pictures(space_of: SpaceOf) -> None:
     trajectory, space = manoeuvre("parking-sideways"), space_of("four-wheel-steering")
     report = validate(trajectory, space)
-    (mark,) = marks_of(report)
-    assert (mark.number, mark.violation.limit) == (1, "STEER_RANGE")
+    way, mark = marks_of(report)
+    assert (way.number, way.violation.limit) == (1, "RECONFIGURATION")
+    assert way.text == "reconfiguration of front-left at t = 3.00 s"
+    assert (mark.number, mark.violation.limit) == (2, "STEER_RANGE")
     assert "steering range of front-left: -90.0°, permitted -40.0°" in mark.text
     assert "(and 3 more)" in mark.text
     drive = drive_of(trajectory, space)
@@ -128,8 +130,8 @@ def test_violations_are_numbered_alike_in_all_pictures(space_of: SpaceOf) -> Non
         plot_on_space(drive, report),
         plot_times(drive, report),
     ):
-        assert "1" in texts(figure)
-        assert f"(1)  {mark.text}" in below(figure)
+        assert {"1", "2"} <= set(texts(figure))
+        assert f"(1)  {way.text}\n(2)  {mark.text}" in below(figure)
         assert "not permitted" in figure.get_suptitle()
 
 

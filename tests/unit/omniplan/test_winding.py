@@ -328,3 +328,28 @@ def test_a_range_of_many_turns_is_judged_as_well() -> None:
     assert report.valid
     # By far most is left in the middle of the range: the stops are not what is near.
     assert not report.tightest.startswith("STEER_RANGE")
+
+
+@pytest.mark.parametrize("free", [(-270, 150), (-150, 270)])
+def test_a_direction_at_rest_does_not_wind_a_wheel(
+    free: tuple[float, float],
+) -> None:
+    """Other limits are broken, so the parts beside rest are not cut for its sake."""
+    ranges = [free, (100, 260), (-80, 80), (-80, 80)]
+    wheels = [
+        {"id": f"w{i}", "type": "steered", "x": x, "y": y, "max_speed": 2.0,
+         "steering_range_deg": range_}
+        for i, ((x, y), range_) in enumerate(zip(AREA, ranges, strict=True))
+    ]  # fmt: skip
+    rates = {"max_acceleration": 1.0, "max_deceleration": 1.0}
+    vehicle = vehicle_from_data({"name": "stuck", "wheels": wheels, "limits": rates})
+    space = configspace.build_space(vehicle, Grid(40, 72), cache=False)
+    u = np.linspace(0, 1, 5)
+    x = -u * u * (3 - 2 * u)
+    t = np.concatenate([[0], 2 + 4 * u])
+    poses = np.stack([np.concatenate([x[:1], x]), 0 * t, 0 * t], axis=-1)
+    report = validate(Trajectory.from_poses(t, poses), space, allow_unreachable=True)
+    # Backwards one wheel less is beyond its stops, the free one among those within.
+    (violation,) = report.violations
+    assert (violation.wheel, violation.limit) == ("w1", "STEER_RANGE")
+    assert violation.is_proved
