@@ -31,6 +31,7 @@ __all__ = [
     "scaled",
     "size",
     "speed_of",
+    "spot_spread",
     "turning",
 ]
 
@@ -271,16 +272,33 @@ def turning(
 def one_way(part: Enclosure, chord: Chord, change: Change) -> BoolArray:
     """Return whether the direction of U surely never turns back over a part.
 
-    ``Im(U̇ Ū)`` keeps its sign if both ends together exceed what it may change by. In a
-    turn on the spot, with v = 0 all along, U keeps to one line through zero.
+    ``Im(U̇ Ū)`` keeps its sign if both ends together exceed what it may change by.
     """
     first, last = (
         (d * u.conj()).imag for u, d in ((chord.a, change.a), (chord.b, change.b))
     )
     may_change = part.dt * change.bend * chord.far
-    on_line = (part.v0 == 0) & (part.v1 == 0) & (part.v_ddot == 0)
-    is_kept = on_line | (np.abs(first + last) >= may_change)
-    return np.asarray((chord.near > 0) & is_kept)
+    return np.asarray((chord.near > 0) & (np.abs(first + last) >= may_change))
+
+
+def spot_spread(body: Chord, chord: Chord) -> FloatArray:
+    """Return by how much directions of U may differ near a turn on the spot, rad.
+
+    With v of the reference k and ``U = v + jω (p - k)``: the sine of the angle between
+    U and the line along ``j (p - k)`` is ``|v| / |U|`` at most, and ω keeps its sign as
+    long as that is below 1. Two directions differ by twice that angle at most, and
+    ``asin x ≤ π/2 x``.
+
+    Parameters
+    ----------
+    body : Chord
+        Of the reference, (m,) parts.
+    chord : Chord
+        Of one or n points.
+    """
+    is_clear = body.far < chord.near
+    share = body.far / np.where(is_clear, chord.near, 1.0)
+    return np.asarray(np.where(is_clear, np.pi * share, np.inf))
 
 
 def growth_excess(part: Enclosure, chord: Chord, change: Change) -> FloatArray:

@@ -27,6 +27,7 @@ from omniplan.judging.chords import (
     one_way,
     over,
     scaled,
+    spot_spread,
     turning,
 )
 from omniplan.judging.look import Look
@@ -193,6 +194,8 @@ class SteeredWheels:
         # The segment sweeps from start to end; its surroundings a little more, but not
         # where the angle moves one way only: a wheel may leave its very stop.
         spread = np.where(one_way(look.part, chord, change), 0.0, chord.spread())
+        # Nor in a turn on the spot, however fast it is: it may stand at its very stop.
+        spread = np.minimum(spread, spot_spread(look.body, chord))
         turned = np.angle(chord.b * chord.a.conj())
         found = []
         for own in look.owns:

@@ -94,6 +94,48 @@ def test_a_wheel_may_leave_and_reach_its_very_stop() -> None:
     assert {v.t for v in report.violations} == {0.0, 1 / 0.9}
 
 
+def front_steered(stop: float) -> configspace.PermissibleSpace:
+    """The tricycle whose front wheel turns by so many degrees to either side."""
+    data = configspace.load_vehicle("tricycle").model_dump(
+        mode="json", exclude_none=True
+    )
+    data["wheels"][0]["steering_range_deg"] = [-stop, stop]
+    return configspace.build_space(
+        configspace.vehicle_from_data(data), configspace.Grid(20, 36), cache=False
+    )
+
+
+def on_the_spot(turn: float, drift: float = 0.0) -> Trajectory:
+    """Turning by an angle in 4 s, K `drift` metres ahead of where it turns about."""
+    u = np.linspace(0, 1, 21)
+    heading = 0.3 + turn * u * u * (3 - 2 * u)
+    at = 1.2345 - 3.21j + drift * np.exp(1j * heading)
+    return Trajectory.from_poses(4 * u, np.column_stack([at.real, at.imag, heading]))
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0, 0.01])
+def test_a_wheel_may_turn_the_vehicle_on_the_spot_at_its_very_stop(
+    turn: float,
+) -> None:
+    assert validate(on_the_spot(turn), front_steered(90.0)).valid
+    assert validate(on_the_spot(turn), front_steered(90.0 + 1e-6)).valid
+    report = validate(on_the_spot(turn), front_steered(90.0 - 1e-6))
+    assert {v.limit for v in report.violations} == {"STEER_RANGE"}
+    assert all(v.is_proved for v in report.violations)
+
+
+@pytest.mark.parametrize("drift", [1e-6, -1e-6])
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_nearly_on_the_spot_a_wheel_at_its_stop_is_beyond_it(
+    turn: float, drift: float
+) -> None:
+    """A spline is no circle: now and then K moves a little ahead or back."""
+    report = validate(on_the_spot(turn, drift), front_steered(90.0))
+    assert {v.limit for v in report.violations} == {"STEER_RANGE"}
+    nearly = on_the_spot(turn, drift)
+    assert validate(nearly, front_steered(90.1)).valid
+
+
 def test_what_is_decided_is_not_judged_again(monkeypatch: pytest.MonkeyPatch) -> None:
     space = steered_so_far(155.0)
     trajectory = turning_about(space, 0.999)
