@@ -15,7 +15,7 @@ from omniplan.judging.judge import judge_for
 from omniplan.judging.rows import Tolerances
 from omniplan.path import Path
 from omniplan.proving import Proved, prove
-from omniplan.report import Report
+from omniplan.report import Report, Violation
 from omniplan.standing.ways import Changer
 from omniplan.timing.caps import cap_use
 from omniplan.timing.path_motion import PathMotion, PathPiece
@@ -108,7 +108,8 @@ class _Try:
     def is_mendable(self) -> bool:
         """Whether driving some places more slowly may help."""
         return all(
-            v.limit not in SHAPE_LIMITS and v.limit != "RECONFIGURATION"
+            v.limit not in SHAPE_LIMITS
+            and (v.limit != "RECONFIGURATION" or _crawl(v, self.legs) > 1)
             for v in self.report.violations
         )
 
@@ -300,7 +301,14 @@ class Timer:
         spans, starts = proved.parts.spans, [leg.t[0] for leg in legs]
         leg = np.searchsorted(starts, (spans.t0 + spans.t1) / 2, side="right") - 1
         sign = np.array([one.sigma for one in chosen], dtype=np.int64)[leg]
-        return _Try(proved, report, slowdowns_of(proved, sign), legs)
+        slowdowns = slowdowns_of(proved, sign)
+        for violation in report.violations:
+            factor = _crawl(violation, legs)
+            if factor <= 1:
+                continue
+            inside = (spans.t1 > violation.t_start) & (spans.t0 < violation.t_end)
+            slowdowns[inside] = np.maximum(slowdowns[inside], factor)
+        return _Try(proved, report, slowdowns, legs)
 
     def _judged(self, trajectory: Trajectory) -> tuple[Proved, Report]:
         proved = prove(
@@ -458,6 +466,21 @@ def _joined(
 def _locked(values: Array) -> Array:
     values.flags.writeable = False
     return values
+
+
+def _crawl(violation: Violation, legs: list[_Leg]) -> float:
+    """Return how many times more slowly wheels have to turn amid a leg, or 1.
+
+    Where the centre of rotation passes close by a wheel, even the optimum may be slow
+    enough to count as standing; then the wheels turn from rest to rest.
+    """
+    if violation.limit != "RECONFIGURATION" or violation.value is None:
+        return 1.0
+    ends = np.array([leg.t[-1] for leg in legs[:-1]])
+    is_stop = (violation.t_start <= ends) & (ends <= violation.t_end)
+    if is_stop.any() or not 0 < violation.bound < violation.value < math.inf:
+        return 1.0
+    return violation.value / violation.bound
 
 
 def _lengthened(waits: list[float], one: _Try) -> bool:
