@@ -20,8 +20,6 @@ from omniplan.batch.kinds import (
     BOUND,
     KIND,
     PARALLEL,
-    RANGE,
-    RANGE_ERROR,
     SIGN,
     SLIP,
 )
@@ -31,13 +29,14 @@ from omniplan.batch.refine import (
     NO,
     STACK,
     YES,
+    angle_error,
     largest,
     load,
     one_row,
     swing_halves,
 )
 from omniplan.batch.rows import SETTLING
-from omniplan.batch.swings import is_wide, load_swings
+from omniplan.batch.swings import is_wide
 from omniplan.judging.violations import FINEST
 from omniplan.report import SHAPE_LIMITS, TIE
 from omniplan.standing.standstill import BETWEEN
@@ -116,9 +115,7 @@ def _between_samples(
     for b in range(blocks.shape[0]):
         if not those_blocks[b]:
             continue
-        load(blocks, b, s)
-        if wide:
-            load_swings(blocks, b, s)
+        load(blocks, b, s, wide)
         one_row(s, rows, r, vehicle, tolerances, YES)
         waiting = 0
         for k in range(LANES):
@@ -167,7 +164,7 @@ def _at_samples(
     of the intervals.
     """
     count, wide = blocks.shape[0], is_wide(rows[r, KIND])
-    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    error = angle_error(rows, r)
     floor, others = max(KEPT, floor), 0.0
     for b in range(count):
         bound = skipped[r, b]
@@ -177,17 +174,13 @@ def _at_samples(
             continue
         if most + error <= max(floor, best * (1 - TIE)):
             continue
-        load(blocks, b, s)
-        if wide:
-            load_swings(blocks, b, s)
+        load(blocks, b, s, wide)
         one_row(s, rows, r, vehicle, tolerances, SETTLING)
         best = _keep_largest(s, knot_of, b, begin, end, best, place)
     # What the intervals of other blocks reach, their parts do not exceed.
     is_less = others + error <= max(floor, best * (1 - TIE))
     for b in range(0 if is_less else wholes.shape[0]):
-        load(wholes, b, s)
-        if wide:
-            load_swings(wholes, b, s)
+        load(wholes, b, s, wide)
         one_row(s, rows, r, vehicle, tolerances, SETTLING)
         best = _keep_largest(s, whole_knot, b, begin, end, best, place)
     return best
@@ -202,7 +195,7 @@ def _has_broken(
 
     Arc tangents are needed only where the quick ones leave that open.
     """
-    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    error = angle_error(rows, r)
     one_row(s, rows, r, vehicle, tolerances, NO)
     is_open = False
     for k in range(LANES):
@@ -228,7 +221,7 @@ def _breaks(
 ) -> bool:  # fmt: skip
     """Return whether `_at_samples` finds a row broken, without how much it is."""
     count, wide = blocks.shape[0], is_wide(rows[r, KIND])
-    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    error = angle_error(rows, r)
     others = 0.0
     for b in range(count):
         bound = skipped[r, b]
@@ -238,15 +231,11 @@ def _breaks(
             continue
         if most + error <= KEPT:
             continue
-        load(blocks, b, s)
-        if wide:
-            load_swings(blocks, b, s)
+        load(blocks, b, s, wide)
         if _has_broken(s, rows, r, vehicle, tolerances, begin, end):
             return True
     for b in range(0 if others + error <= KEPT else wholes.shape[0]):
-        load(wholes, b, s)
-        if wide:
-            load_swings(wholes, b, s)
+        load(wholes, b, s, wide)
         if _has_broken(s, rows, r, vehicle, tolerances, begin, end):
             return True
     return False
@@ -284,7 +273,7 @@ def count_faults(
         begin, end = _window(blocks, ends, pieces, p)
         common = False
         for r in range(rows.shape[0]):
-            error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+            error = angle_error(rows, r)
             sign = rows[r, SIGN]
             if high[r] + error <= KEPT or (sign == 0 and common):
                 continue
@@ -316,7 +305,7 @@ def _most_telling(
     for c in range(CLASSES + 1):
         which, most, reached = NOWHERE, 0.0, 0.0
         for r in range(n):
-            error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+            error = angle_error(rows, r)
             if order[r, 0] != c or high[r] + error <= KEPT:
                 continue
             is_slip = rows[r, KIND] == SLIP or rows[r, KIND] == PARALLEL

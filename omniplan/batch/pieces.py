@@ -82,7 +82,7 @@ def pieces_of(
     pieces = 0
     stood, leaving, arriving = True, True, False
     for b in range(blocks.shape[0]):
-        load(blocks, b, s)
+        load(blocks, b, s, False)
         body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
         for k in range(min(LANES, count - b * LANES)):
             if s[STANDS + k] > 0:
@@ -96,7 +96,7 @@ def pieces_of(
                 is_slow = not _moves(
                     knots[knot_of[b, k]], form, t0, t1, vehicle, tolerances, s
                 )
-                load(blocks, b, s)
+                load(blocks, b, s, False)
                 body(s, vehicle[0], vehicle[1], vehicle[2], tolerances[0])
             # Slow it may be as long as it leaves a standstill or comes to one.
             leaving = leaving and is_slow and v1 >= v0
@@ -137,10 +137,10 @@ def _continues(
         # The row of the range follows that of the singular point.
         ranged = r + 1 < rows.shape[0] and rows[r + 1, KIND] == RANGE
         middle = rows[r + 1, ANGLE] if ranged else 0.0
-        load(blocks, last // LANES, s)
+        load(blocks, last // LANES, s, False)
         chord(s, x, y)
         a = angle_of(s, last % LANES, True, before, middle)
-        load(blocks, first // LANES, s)
+        load(blocks, first // LANES, s, False)
         chord(s, x, y)
         b = angle_of(s, first % LANES, False, after, middle)
         turn = b - a

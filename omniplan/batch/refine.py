@@ -27,6 +27,7 @@ __all__ = [
     "NO",
     "STACK",
     "YES",
+    "angle_error",
     "describe",
     "load",
     "one_row",
@@ -58,11 +59,22 @@ UNSEEN, SEEN, BROKEN = 0.0, 1.0, 2.0
 
 
 @kernel()
-def load(blocks: Array, b: int, s: Array) -> None:
-    """Copy the enclosures of a block into the scratch array."""
+def load(blocks: Array, b: int, s: Array, swings: bool) -> None:
+    """Copy the enclosures of a block into the scratch array, and how directions swing.
+
+    The latter only if `swings`.
+    """
     flat, at = blocks.flat, b * blocks.shape[1] * LANES
     for k in range(FIELDS * LANES):  # one loop is vector code, two are not
         s[k] = flat[at + k]
+    if swings:
+        load_swings(blocks, b, s)
+
+
+@kernel(inline="always")
+def angle_error(rows: Array, r: int) -> float:
+    """Return how far the quick arc cosine may put the utilisation of a row off."""
+    return RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
 
 
 @kernel()
@@ -138,9 +150,7 @@ def sweep(
         count = _choose_rows(rows, order, b, least, state, chosen, skipped)
         if count == 0:
             continue
-        load(blocks, b, s)
-        if swings:
-            load_swings(blocks, b, s)
+        load(blocks, b, s, swings)
         for j in range(count):
             r = int(chosen[j])
             if state[r] == UNSEEN:
@@ -267,7 +277,7 @@ def refine(
     waiting = 0
     # What `sweep` found on every part.
     parts = r * blocks.shape[0] * LANES
-    error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+    error = angle_error(rows, r)
     for b in range(first // LANES, (last - 1) // LANES + 1):
         at = parts + b * LANES
         bound = skipped[r, b]
@@ -276,9 +286,7 @@ def refine(
             high = most if most > high else high
             continue
         if reaching or is_proof or bound >= 0.0:
-            load(blocks, b, s)
-            if is_wide(rows[r, KIND]):
-                load_swings(blocks, b, s)
+            load(blocks, b, s, is_wide(rows[r, KIND]))
             one_row(s, rows, r, vehicle, tolerances, NO)
             if bound >= 0.0:
                 for k in range(LANES):

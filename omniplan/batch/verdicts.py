@@ -26,7 +26,6 @@ from omniplan.batch.kinds import (
     OWN_RANGE,
     PARALLEL,
     RANGE,
-    RANGE_ERROR,
     SIGN,
     SINGULAR,
     SLIP,
@@ -40,6 +39,7 @@ from omniplan.batch.refine import (
     NO,
     STACK,
     YES,
+    angle_error,
     describe,
     refine,
     sweep,
@@ -133,7 +133,7 @@ def _settled(
         if rows[r, SIGN] == 0:
             continue
         side = 0 if rows[r, SIGN] > 0 else 1
-        error = RANGE_ERROR / rows[r, BOUND] if rows[r, KIND] == RANGE else 0.0
+        error = angle_error(rows, r)
         for p in range(pieces):
             known = high[r] + error <= KEPT or low[r] - error > KEPT
             if pieces == 1 and known:

@@ -14,7 +14,7 @@ from omniplan.batch.chords import HIGH, LOW, ROOM
 from omniplan.batch.fleet import fleet_of
 from omniplan.batch.motions import FIELDS, LANES, motions_of
 from omniplan.batch.refine import YES, load, one_row
-from omniplan.batch.swings import load_swings, widened
+from omniplan.batch.swings import widened
 from omniplan.bench_cases import random_trajectories
 from omniplan.judging.rows import Judge
 from omniplan.judging.vehicle_judge import VehicleJudge
@@ -74,8 +74,7 @@ def rows_of_kernel(
     for r, label in enumerate(fleet.labels):
         low, high = np.empty((2, len(wide) * LANES))
         for b in range(len(wide)):
-            load(wide, b, room)
-            load_swings(wide, b, room)
+            load(wide, b, room, True)
             one_row_alone(room, fleet.rows, r, fleet.bodies[0])
             at = slice(b * LANES, (b + 1) * LANES)
             low[at], high[at] = room[LOW : LOW + LANES], room[HIGH : HIGH + LANES]
