@@ -48,6 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         answers.complain(error, options.json)
         return answers.code_of(error)
     except KeyboardInterrupt:
+        answers.complain(InterruptedError("interrupted"), options.json)
         return FAILURE
     except BrokenPipeError:  # the reader, such as head, has seen enough
         sys.stderr.close()

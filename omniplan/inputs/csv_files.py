@@ -174,15 +174,11 @@ def write_csv(
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["trajectory", *columns])
         owners = (name for name, n in zip(names, sizes, strict=True) for _ in range(n))
-        texts = [map(_text if key == "t" else _short, columns[key]) for key in columns]
+        texts = [map(_text, columns[key]) for key in columns]
         writer.writerows(zip(owners, *texts, strict=True))
 
 
-def _short(value: float) -> str:
-    return f"{value:.9g}"
-
-
-def _text(t: float) -> str:
-    """Return a time with all its digits; seconds since 1970 need more than nine."""
-    short = _short(t)
-    return short if float(short) == t else repr(float(t))
+def _text(value: float) -> str:
+    """Return a number with all its digits: a plan uses its limits up to the last."""
+    short = f"{value:.9g}"
+    return short if float(short) == value else repr(float(value))

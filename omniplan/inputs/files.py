@@ -70,7 +70,7 @@ def write_trajectories(
 ) -> None:
     """Write trajectories of one form, or paths, to a Parquet or a CSV file.
 
-    Parquet keeps every digit; CSV keeps nine, and all of a time.
+    Both keep every digit.
 
     Parameters
     ----------

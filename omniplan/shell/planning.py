@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "plan"]
 
 _OF_A_VEHICLE = ("vehicle", "start", "goal")
-_BESIDE_THEM = ("map", "obstacles", "bounds", "clearance", "planner", "plot")
+_BESIDE_THEM = (
+    *("map", "obstacles", "bounds", "clearance", "planner", "method", "heading"),
+    *("iterations", "plot"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +65,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--time", type=float, help="for each search, s; default 5, 60 for scenarios"
     )
     parser.add_argument("--seed", type=int, help="default 1, or that of the scenario")
+    parser.add_argument(
+        "--iterations",
+        type=int,
+        help="motions checked at most: with enough time the same seed gives the same "
+        "plan",
+    )
+    parser.add_argument(
+        "--method", help="geometric (default), or control: rates as controls"
+    )
+    parser.add_argument(
+        "--heading", help="free (default), or keep: the load keeps its heading"
+    )
     parser.add_argument(
         "--out",
         type=Path,
@@ -167,6 +182,8 @@ def _vehicle(options: argparse.Namespace) -> int:
     obstacles = _obstacles(options)
     if options.out is not None:
         require_file("--out", options.out, ".csv", ".parquet")
+    if options.plot is not None:
+        make_folder("--plot", options.plot)
     space = loading.space_of(options.vehicle)
     with answers.progress_console().status("Planning"):
         found = find(
@@ -179,6 +196,9 @@ def _vehicle(options: argparse.Namespace) -> int:
             planner=options.planner or "RRTConnect",
             time=5.0 if options.time is None else options.time,
             seed=1 if options.seed is None else options.seed,
+            iterations=options.iterations,
+            method=options.method or "geometric",
+            heading=options.heading or "free",
         )
     solution = Solution(space, obstacles, found)
     if options.json:
@@ -201,7 +221,6 @@ def _drawn(solution: Solution, folder: Path) -> Iterator[Path]:
     from omniplan.plots.pictures import plot_report
     from omniplan.plots.plans import plot_plans
 
-    make_folder("--plot", folder)
     path = folder / f"plan-{solution.vehicle}.png"
     save_figure(plot_plans([solution]), path)
     yield path

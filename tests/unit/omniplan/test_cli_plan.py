@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +43,60 @@ def test_a_plan_is_found_written_and_drawn(capsys: Capture, tmp_path: Path) -> N
     names = {path.name for path in (tmp_path / "pictures").iterdir()}
     assert "plan-mecanum.png" in names
     assert len(names) > 1
+
+
+def test_what_a_plan_writes_is_permitted_when_it_is_read(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    # A plan uses its limits up: digits that are cut off would break them.
+    for vehicle in ("ackermann", "four-wheel-steering", "differential"):
+        out = tmp_path / f"{vehicle}.csv"
+        words = f"plan --vehicle {vehicle} --start 0,0,0 --goal 2.5,0.7,30 --time 0.5"
+        assert cli.main([*words.split(), "--iterations", "300", "--out", f"{out}"]) == 0
+        assert cli.main(["check", f"{out}", "--vehicle", vehicle]) == 0
+    capsys.readouterr()
+
+
+def test_the_load_keeps_its_heading_if_asked(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "way.csv"
+    ways = ["--vehicle", "mecanum", "--start=0,0,0", "--goal=2,1,0", "--out", f"{out}"]
+    assert answer(capsys, *ways, "--heading", "keep")[0] == 0
+    (trajectory,) = read_trajectories(out)
+    assert (trajectory.samples[:, 2] == 0).all()  # type: ignore[union-attr]
+    code, found = answer(
+        capsys, *ways[:2], "--start=0,0,0", "--goal=2,1,30", "--heading", "keep"
+    )
+    assert code == 1
+    assert "keep its heading" in str(found["plan"]["message"])  # type: ignore[index]
+
+
+def test_rates_may_be_the_controls(capsys: Capture) -> None:
+    ways = ["--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0"]
+    code, found = answer(capsys, *ways, "--method", "control", "--time", "20")
+    assert code == 0, found
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
+@pytest.mark.parametrize("argument", ["--out", "--plot"])
+def test_places_that_take_no_files_are_refused_before_the_search(
+    capsys: Capture, tmp_path: Path, argument: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unasked(*_: object, **__: object) -> None:
+        raise AssertionError("the search has begun")
+
+    monkeypatch.setattr("omniplan.planning.planner.plan", unasked)
+    ways = ["plan", "--vehicle", "mecanum", "--start=0,0,0", "--goal=1,0,0"]
+    (tmp_path / "taken.csv").mkdir()
+    (tmp_path / "file").write_text("")
+    places = {
+        "--out": [tmp_path / "taken.csv", Path("/proc/way.csv")],
+        "--plot": [tmp_path / "file", Path("/proc")],
+    }
+    for place in places[argument]:
+        assert cli.main([*ways, argument, f"{place}"]) == 2
+        assert (
+            f"{argument}: {place}".removesuffix("/way.csv") in capsys.readouterr().err
+        )
 
 
 def test_json_holds_plan_and_area(capsys: Capture) -> None:
@@ -94,6 +151,19 @@ def test_a_blocked_goal_is_a_no(capsys: Capture, tmp_path: Path) -> None:
             "time",
         ),
         (
+            ["--vehicle=mecanum", "--start=0,0,0", "--goal=1,0,0", "--method=guess"],
+            "method: 'guess'; one of geometric, control",
+        ),
+        (
+            ["--vehicle=mecanum", "--start=0,0,0", "--goal=1,0,0", "--heading=north"],
+            "heading: 'north'; one of free, keep",
+        ),
+        (
+            ["--vehicle=mecanum", "--start=0,0,0", "--goal=1,0,0", "--iterations=0"],
+            "iterations: 0; a whole number, at least 1",
+        ),
+        (["--scenario", "pillar", "--heading", "keep"], "--heading: given with"),
+        (
             [
                 "--vehicle",
                 "mecanum",
@@ -146,3 +216,49 @@ def test_a_scenario_prints_a_table(capsys: Capture) -> None:
 def test_too_little_time_is_a_no(capsys: Capture) -> None:
     assert cli.main(["plan", "--scenario", "pillar", "--time", "1e-9"]) == 1
     assert "no way was found" in capsys.readouterr().out
+
+
+SEARCHING = """
+import sys
+from omniplan import cli
+from omniplan.planning import task
+
+start = task.Budget.start
+
+
+def told(budget):
+    print("begins", file=sys.stderr, flush=True)
+    start(budget)
+
+
+task.Budget.start = told
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begun", [0.3, 2.0])
+def test_ctrl_c_ends_a_plan_quietly(tmp_path: Path, begun: float) -> None:
+    """In the search, which is within OMPL's C++ for the most part; 3 is failure."""
+    hall = tmp_path / "hall.json"
+    hall.write_text(json.dumps(WALL))
+    words = (
+        "plan --vehicle ackermann --start -0.5,0,0 --goal 2.5,0,90 --planner RRTstar "
+        f"--obstacles {hall} --time 300"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", SEARCHING, *words.split()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "begins\n"
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=begun)
+        process.send_signal(signal.SIGINT)
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert out == ""
+    assert "Traceback" not in told
+    assert "leaked" not in told
