@@ -128,6 +128,7 @@ def judged(
     space: PermissibleSpace,
     tolerances: Tolerances,
     allow_unreachable: bool,
+    checkpoint: Callable[[], None] | None = None,
 ) -> Report:
     """Judge a timed trajectory once, without advice and proved speed factor.
 
@@ -136,11 +137,17 @@ def judged(
     trajectory : Trajectory
     space : PermissibleSpace
     tolerances : Tolerances
-    allow_unreachable : bool
+    allow_unreachable, checkpoint
         As for `validate`.
     """
     return report_of(
-        prove(trajectory, space, tolerances, allow_unreachable=allow_unreachable)
+        prove(
+            trajectory,
+            space,
+            tolerances,
+            allow_unreachable=allow_unreachable,
+            checkpoint=checkpoint,
+        )
     )
 
 

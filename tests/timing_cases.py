@@ -9,9 +9,13 @@ import numpy.typing as npt
 
 from configspace import Vehicle, vehicle_from_data
 from configspace.testing import VehicleKind, random_vehicle
-from omniplan import Path
+from omniplan import Path, Trajectory
+from omniplan.motion import PoseMotion, motion_of
 
 FloatArray = npt.NDArray[np.float64]
+
+SOON = 1e-3
+"""A moment after rest, as a share of the step that starts with it."""
 
 
 def demanding_vehicle(rng: np.random.Generator, kind: VehicleKind) -> Vehicle:
@@ -56,3 +60,25 @@ def smooth_path(rng: np.random.Generator, n: int = 6) -> Path:
     poses = np.stack([p.real, p.imag, theta], axis=1)
     point = tuple(rng.uniform(-0.3, 0.3, 2).tolist())
     return Path.from_poses(poses, reference_point=point)
+
+
+def assert_rests(trajectory: Trajectory, stops: int) -> None:
+    """At both ends and at so many stops the motion comes to rest and from rest.
+
+    Seen from its poses alone, shortly after each rest and before it.
+    """
+    motion = motion_of(trajectory, is_own=False)
+    assert isinstance(motion, PoseMotion)
+    moves = np.linalg.norm(np.diff(trajectory.samples, axis=0), axis=1) > 1e-12
+    edges = np.flatnonzero(np.diff(moves, prepend=False, append=False))
+    assert edges.size == 2 * (stops + 1)
+    t = trajectory.t
+    leaves = [(t[k], t[k + 1]) for k in edges[::2].tolist()]
+    arrives = [(t[k], t[k - 1]) for k in edges[1::2].tolist()]
+    for rest, next_ in (*leaves, *arrives):
+        moments = rest + np.array([0.0, SOON, 1.0]) * (next_ - rest)
+        poses = motion.poses_at(moments)
+        early, whole = np.linalg.norm(poses[1:] - poses[0], axis=1)
+        # A pull that falls to zero within the step gives the most, 3/2 SOON².
+        blur = 1e-15 * np.abs(poses).max()
+        assert early < 4 * SOON**2 * whole + blur, rest

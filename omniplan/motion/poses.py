@@ -55,19 +55,28 @@ def stops_of(samples: FloatArray) -> npt.NDArray[np.bool_]:
     return stop
 
 
-def starts_at_rest(t: FloatArray, samples: FloatArray) -> bool:
+def starts_at_rest(
+    t: FloatArray, samples: FloatArray, share: float = REST_SHARE
+) -> bool:
     """Return whether samples leave their first one from rest.
 
-    The speed there, by the parabola through three samples, is far below that of the
-    first step. A spline with a free end would swing backwards before such a start.
+    The speed there, by the parabola through three samples, is less than a share of that
+    of the first step. A spline with a free end would swing backwards before such a
+    start.
+
+    Parameters
+    ----------
+    t : (n,) float, s
+    samples : (n, 3) float, m, m, rad
+    share : float, (0, 1)
+        The smaller, the clearer.
     """
     if len(t) < 3:
         return False
     chord = np.diff(samples[:3], axis=0) * [1.0, 1.0, HEADING_LENGTH]
     first, second = chord / np.diff(t[:3])[:, None]
-    share = (t[1] - t[0]) / (t[2] - t[0])
-    at_start = first - share * (second - first)
-    return bool(at_start @ first < REST_SHARE * (first @ first))
+    at_start = first - (t[1] - t[0]) / (t[2] - t[0]) * (second - first)
+    return bool(at_start @ first < share * (first @ first))
 
 
 class PoseMotion:

@@ -77,6 +77,9 @@ def _parts(
 
 def _passed(t: FloatArray, u: FloatArray, knots: FloatArray) -> FloatArray:
     """Return when the way u(t), from rest to rest, passes places; by halving."""
+    moves = np.flatnonzero(np.diff(u) > 0)
+    run = slice(moves[0], moves[-1] + 2)  # without the dwells before and after it
+    t, u = t[run], u[run]
     way = CubicSpline(t, u, bc_type="clamped")
     k = np.clip(np.searchsorted(u, knots, side="right") - 1, 0, t.size - 2)
     low, high = t[k], t[k + 1]

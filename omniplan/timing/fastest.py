@@ -10,7 +10,7 @@ pose trajectory keep the limits, and `validate` has the last word.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -78,6 +78,7 @@ def time_path(
     allow_unreachable: bool = False,
     grid: int = GRID,
     steps: int = STEPS,
+    checkpoint: Callable[[], None] | None = None,
 ) -> Timing:
     """Return the fastest permitted timing of a path, or why there is none.
 
@@ -89,6 +90,8 @@ def time_path(
         Least number of grid intervals between two stops, for the optimum.
     steps : int, ≥ 4
         Least number of samples between two stops, for the trajectory.
+    checkpoint : callable, optional
+        Called again and again; what it raises ends the work.
 
     References
     ----------
@@ -101,6 +104,7 @@ def time_path(
         allow_unreachable=allow_unreachable,
         grid=grid,
         steps=steps,
+        checkpoint=checkpoint,
     )[0]
 
 
@@ -112,13 +116,14 @@ def time_paths(
     allow_unreachable: bool = False,
     grid: int = GRID,
     steps: int = STEPS,
+    checkpoint: Callable[[], None] | None = None,
 ) -> tuple[Timing, ...]:
     """Time many paths for one vehicle; the optima are computed together, in parallel.
 
     Parameters
     ----------
     paths : iterable of Path or Trajectory
-    space, tolerances, allow_unreachable, grid, steps
+    space, tolerances, allow_unreachable, grid, steps, checkpoint
         As of `time_path`.
 
     Returns
@@ -137,7 +142,9 @@ def time_paths(
     routes = [path_of(path) for path in paths]
     if not routes:
         return ()
-    timer = Timer(space, tolerances or Tolerances(), allow_unreachable, steps)
+    timer = Timer(
+        space, tolerances or Tolerances(), allow_unreachable, steps, checkpoint
+    )
     pieces = [pieces_of(route) for route in routes]
     problem = TimingProblem([p for some in pieces for p in some], space.vehicle, grid)
     signs = timer.signs(pieces[0][0])

@@ -4,11 +4,9 @@ A profile becomes a C² motion as a B-spline in time (see `waves`). Where limits
 within a few of its steps the means may break them: there the steps are made shorter,
 and where they are short enough the limits are tightened, and the piece is timed again.
 
-A steering acceleration also depends on the third derivatives of the pose. Those of a
-spline through samples are right only where the true ones change slowly: the path's own
-jumps are rounded off (see `rounding`), and steps in which they change much get more
-samples. Next to rest they are off by a share of the time since then: there samples
-follow each other in shares of it.
+A steering acceleration also depends on the third derivatives of the pose: the path's
+own jumps of those are rounded off (see `rounding`), and more samples are taken where
+they change much (see `swing_times`).
 """
 
 from __future__ import annotations
@@ -19,12 +17,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from omniplan.motion import starts_at_rest
 from omniplan.timing.path_motion import PathPiece
-from omniplan.timing.rounding import STAIRS
 from omniplan.timing.solver import PieceProfile, TimingProblem
+from omniplan.timing.swing_times import (
+    BLUR,
+    BLURRED,
+    EXACT,
+    MOST,
+    SLOWEST,
+    STILL,
+    Windows,
+    swing_times,
+)
 from omniplan.timing.waves import Wave, graded, spaced, wave_of
 
-__all__ = ["PieceSampler", "SampledPiece"]
+__all__ = ["DWELL", "PieceSampler", "SampledPiece"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -50,24 +58,13 @@ SHORTEST = 1 / 64, 1e-5
 """... nor in all, or to less than so many seconds."""
 AROUND = 2
 """So many steps before and after a place are dealt with like it."""
-EXACT = 0.01
-"""Share of a limit on the steering acceleration by which samples may miss it ..."""
-MOST = 48
-"""... unless a step needs more samples than this."""
-SINCE_REST = 0.025
-"""Share of the time since rest, or until it, that a sample may take ..."""
-BLUR = 1e-14
-"""... but not less time than lets rounding, of third derivatives so much over the cube
-of a sample's time per metre from the origin, be a share `BLURRED` of the limit."""
-BLURRED = 0.02
-WINDOW = 6.0
-"""Steps before and after a knot of the path over which its jump is rounded off ..."""
-JUMPS = 0.01, 0.15
-"""... with no cubics, few or many, as the jump is a share of the limit, and ..."""
-STILL = 1e-8
-"""Way per step at least, m: shorter ones would count as standing."""
-SLOWEST = 1e-3
-"""Paces and pulls count as this at least, m/s and m/s², or a share."""
+TURN = np.radians(30)
+"""By so much the heading may turn in a step, or the way round would not be clear."""
+CLEARLY = 0.1
+"""Where the parabola through the first samples has more than this share of the first
+step's speed in the beginning, there are more of them: a reader has to see the rest."""
+DWELL = 1e-4
+"""Time at rest, s, so that a pose is repeated and cannot be taken for a passing one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +112,9 @@ class PieceSampler:
         dt = profile.duration / max(min(steps, int(most)), 4)
         self._max_change = float(np.sqrt(profile.x.max())) / (RAMP * dt)
         self._problem, self._piece, self._dt = problem, piece, dt
-        self._samples: _Windows | None = None
+        self._samples: Windows | None = None
         if problem.bounds_steering_acceleration:
-            self._samples = _Windows.of(problem, piece, profile, dt)
+            self._samples = Windows.of(problem, piece, profile, dt)
             problem = problem.rounded(piece, self._samples.reach, self._samples.stairs)
             (first,) = problem.solve([0], [self._sigma], max_change=[self._max_change])
             self._problem, self._piece = problem.refined([[first]]), 0
@@ -135,13 +132,22 @@ class PieceSampler:
             blur = self._far * self._gain[1] / np.maximum(pace, SLOWEST * pace.max())
             self._finest = np.cbrt(blur)
             self._least = np.maximum(self._least, self._finest)
-        self._step = np.full(self.u.size, dt)
+        self._step = np.minimum(dt, self._turning_times(profile))
         self._tight = np.ones(self.u.size)
         self._finer, self._steeper = FINER, STEEPER
 
     @property
     def _given(self) -> PathPiece:
         return self._problem.pieces[self._piece]
+
+    def _turning_times(self, profile: PieceProfile) -> FloatArray:
+        """Return how long the heading takes for as much as a step may turn, (n,) s."""
+        turned = np.abs(np.diff(self._given.poses_at(profile.u)[:, 2]))
+        with np.errstate(divide="ignore"):
+            longest = TURN * np.diff(profile.times) / turned
+        beside = np.minimum(np.append(longest, np.inf), np.insert(longest, 0, np.inf))
+        shortest = np.minimum(beside, profile.duration)
+        return np.asarray(np.interp(self.u, profile.u, shortest))
 
     def steps_at(self, times: FloatArray) -> FloatArray:
         """Return how long the steps are where nodes are passed at times, (n,) s."""
@@ -243,75 +249,36 @@ class PieceSampler:
         self._step, self._tight = shorter, self._tight * tight
 
     def _samples_of(self, wave: Wave, excess: float) -> SampledPiece:
-        if self._samples is None:
-            return SampledPiece(wave.t, wave.u, self._given, excess)
-        turn, lever = (np.interp(wave.u, self.u, gain) for gain in self._gain)
-        blur = self._far * lever
-        step = np.diff(wave.t)
-        samples = np.maximum(
-            _samples_per_step(wave, turn), self._samples.per_step(wave)
-        )
-        # Next to a long sample a short one shares its error, many times over.
-        middle = (wave.t[1:] + wave.t[:-1]) / 2
-        samples = np.ceil(step / graded(middle, step / samples) - 1e-9).astype(np.int64)
-        # A third derivative is blurred by `blur / h³` per u̇.
-        pace = np.minimum(wave.speed[1:], wave.speed[:-1])
-        pace = np.maximum(pace, self._dt * SLOWEST)
-        least = np.cbrt(np.maximum(blur[1:], blur[:-1]) / pace)
-        most = np.clip(step / least, 1, MOST).astype(np.int64)
-        t = _divided(wave.t, np.minimum(samples, most))
-        last = t[-1]
-        for end in (0, -1):
-            pull = abs(float(wave.change[end]))
-            t = _from_rest(t, pull, float(blur[end]))
-            t = (last - t)[::-1]
-        u = wave.at(t)[0]
+        t = wave.t
+        if self._samples is not None:
+            turn, lever = (np.interp(wave.u, self.u, gain) for gain in self._gain)
+            slowest = self._dt * SLOWEST
+            t = swing_times(wave, self._samples, turn, self._far * lever, slowest)
+        t = self._resting(wave, t)
+        u = wave.at(np.clip(t, wave.t[0], wave.t[-1]))[0]
         u[[0, -1]] = wave.u[[0, -1]]
-        return SampledPiece(t, u, self._given, excess)
+        return SampledPiece(t - t[0], u, self._given, excess)
 
+    def _resting(self, wave: Wave, t: FloatArray) -> FloatArray:
+        """Return sample times with more of them at rest, so that it is seen.
 
-@dataclass(frozen=True, eq=False)
-class _Windows:
-    """Where jumps of a path's third derivative are rounded off."""
-
-    knots: FloatArray
-    """(k,) m."""
-    reach: FloatArray
-    """(k,) m, before and after a knot."""
-    jump: FloatArray
-    """(k,) by which share of the limit the steering acceleration would jump."""
-
-    @classmethod
-    def of(
-        cls, problem: TimingProblem, piece: int, profile: PieceProfile, dt: float
-    ) -> _Windows:
-        given = problem.pieces[piece]
-        knots = given.u[1:-1]
-        pace = np.sqrt(np.interp(knots, profile.u, profile.x))
-        pace = np.maximum(pace, SLOWEST * pace.max(initial=0.0))
-        _, lever = problem.steering_gain(piece, knots)
-        rise = np.abs(np.diff(given.position[0]))
-        rise += problem.farthest_from(given.point) * np.abs(np.diff(given.heading[0]))
-        return cls(knots, WINDOW * dt * pace, 6 * rise * lever * pace**2)
-
-    @property
-    def stairs(self) -> IntArray:
-        """(k,) cubics per window."""
-        return np.array([0, *STAIRS])[np.searchsorted(JUMPS, self.jump)]
-
-    def per_step(self, wave: Wave) -> IntArray:
-        """Return how many samples every step needs for the sake of jumps, (n - 1,)."""
-        wanted = np.ones(wave.t.size - 1)
-        count = self.stairs
-        for knot, reach, stairs in zip(self.knots, self.reach, count, strict=True):
-            if stairs:
-                first = np.searchsorted(wave.u, knot - reach, side="right") - 1
-                last = np.searchsorted(wave.u, knot + reach)
-                part = slice(max(int(first), 0), int(last))
-                gone = np.diff(wave.u[part.start : last + 1])
-                needed = gone / (2 * reach) * stairs * 1.5
-                wanted[part] = np.maximum(wanted[part], needed)
-        return np.ceil(wanted).astype(np.int64)
+        A slow pace may be reached within one step. Seen from three samples alone such
+        a motion does not start at rest, nor would a spline through them. So the step is
+        halved; one too short for that is left as it is, and a dwell comes before it.
+        """
+        for order in (1, -1):
+            while True:
+                ends = t[::order][:3]
+                u = wave.at(ends)[0]
+                if starts_at_rest(order * ends, self._given.poses_at(u), CLEARLY):
+                    break
+                step, way = ends[1] - ends[0], abs(u[1] - u[0])
+                if way < 4 * STILL or abs(step) < 2 * SHORTEST[1]:
+                    beyond = ends[:1] - order * DWELL
+                    t = np.concatenate([beyond, t][::order])
+                    break
+                t = np.insert(t, order, ends[0] + step / 2)
+        return t
 
 
 def _leap(wave: Wave) -> FloatArray:
@@ -325,60 +292,3 @@ def _caps_change(piece: PathPiece) -> BoolArray:
     """Return at which of the inner knots a cap changes."""
     caps = np.stack([piece.max_speed, piece.max_yaw_rate])
     return np.asarray((caps[:, 1:] != caps[:, :-1]).any(axis=0), dtype=bool)
-
-
-def _samples_per_step(wave: Wave, turn: FloatArray) -> IntArray:
-    """Return how many samples steering accelerations need in each of n - 1 steps.
-
-    Within a step the fourth derivative of a pose is about ``4 p'' u̇ u⃛ + 3 p'' ü²``.
-    A cubic spline leaves it out, so α̈ is off by half a sample of what `turn` makes of
-    ``4 u⃛ + 3 ü²/u̇``.
-
-    Parameters
-    ----------
-    wave : Wave
-    turn : (n,) s²/m, as of `TimingProblem.steering_gain`
-    """
-    h = np.diff(wave.t)
-    # Near rest what is left of a step counts as its time so far.
-    least = np.abs(wave.change[:-1]) * h / 2
-    speed = np.maximum((wave.speed[1:] + wave.speed[:-1]) / 2, least)
-    pull = np.maximum(np.abs(wave.change[1:]), np.abs(wave.change[:-1])) ** 2
-    pull = pull / np.maximum(speed, 1e-300)
-    off = np.maximum(turn[1:], turn[:-1]) * (2 * np.abs(wave.jerk) + 1.5 * pull) * h
-    return np.clip(np.ceil(off / EXACT), 1, MOST).astype(np.int64)
-
-
-def _divided(t: FloatArray, samples: IntArray) -> FloatArray:
-    """Return times that cut every step into equal parts."""
-    step = np.repeat(np.arange(samples.size), samples)
-    first = np.cumsum(samples) - samples
-    since = (np.arange(step.size) - first[step]) / samples[step]
-    return np.append(t[step] + since * np.diff(t)[step], t[-1])
-
-
-def _from_rest(t: FloatArray, pull: float, blur: float) -> FloatArray:
-    """Return sample times with finer ones after the start.
-
-    A steering acceleration is off by the share of the time since rest that a sample
-    takes, and by what rounding makes of it.
-
-    Parameters
-    ----------
-    t : (n,) float, s
-        From 0 on.
-    pull : float, m/s²
-        ü at the start.
-    blur : float, m s²
-        Over u̇ and the cube of a sample's time: how much rounding counts.
-    """
-    pull = max(pull, SLOWEST)
-    least = (BLURRED * blur / pull) ** 0.25
-    added = [0.0, max(least, math.sqrt(2 * STILL / pull))]
-    while added[-1] < t[-1] / 3:
-        step = max(SINCE_REST * added[-1], least)
-        k = int(np.searchsorted(t, added[-1] + step * 0.5))
-        if t[k] - added[-1] <= step * 1.5 and t[k + 1] - t[k] <= step:
-            return np.concatenate([added, t[k:]])
-        added.append(added[-1] + step)
-    return t

@@ -1,8 +1,9 @@
-"""Putting the timing of a path together: pieces, representations, waits, proof."""
+"""The search for a path's timing: tried, judged, timed again, and proved."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -15,13 +16,19 @@ from omniplan.judging.judge import judge_for
 from omniplan.judging.rows import Tolerances
 from omniplan.path import Path
 from omniplan.proving import Proved, prove
-from omniplan.report import Report, Violation
-from omniplan.standing.ways import Changer
-from omniplan.timing.caps import cap_use
+from omniplan.report import Report
+from omniplan.timing.legs import (
+    Leg,
+    crawl_of,
+    legs_of,
+    lengthened,
+    trajectory_of,
+)
 from omniplan.timing.path_motion import PathMotion, PathPiece
+from omniplan.timing.representations import fastest_together
 from omniplan.timing.result import SpeedProfile, Timing, TimingStatus
 from omniplan.timing.sampling import PieceSampler, SampledPiece
-from omniplan.timing.shape import PieceShape, first_fault, shape_of
+from omniplan.timing.shape import first_fault, shape_of
 from omniplan.timing.solver import PieceProfile, TimingProblem
 from omniplan.timing.tightening import any_is_tight, slowdowns_of, tightened
 from omniplan.trajectory import Trajectory
@@ -37,8 +44,6 @@ PER_POSE = 1
 """Least number of steps between two poses of the path."""
 CAPPED = 8
 """So many times more steps where caps have to be kept between samples."""
-DWELL = 1e-4
-"""Time at every stop, s, so that its pose is repeated and the stop cannot be missed."""
 LOSS = 5e-3
 """If a trajectory takes longer than the optimum by more than this share ..."""
 TRIES = 8
@@ -74,17 +79,6 @@ BLOCKED, NO_WAY = TimingStatus.BLOCKED, TimingStatus.NO_WAY
 
 
 @dataclass(frozen=True, eq=False)
-class _Leg:
-    """The samples of one piece."""
-
-    piece: PathPiece
-    t: FloatArray
-    """(n,) s, from the start of the path."""
-    u: FloatArray
-    """(n,) m, from the start of the path."""
-
-
-@dataclass(frozen=True, eq=False)
 class _Try:
     """A trajectory as it was judged."""
 
@@ -93,7 +87,7 @@ class _Try:
     """Its speed factor is what the margins promise."""
     slowdowns: FloatArray
     """How many times more slowly every part had to be passed."""
-    legs: list[_Leg]
+    legs: list[Leg]
 
     @property
     def estimate(self) -> float:
@@ -109,7 +103,7 @@ class _Try:
         """Whether driving some places more slowly may help."""
         return all(
             v.limit not in SHAPE_LIMITS
-            and (v.limit != "RECONFIGURATION" or _crawl(v, self.legs) > 1)
+            and (v.limit != "RECONFIGURATION" or crawl_of(v, self.legs) > 1)
             for v in self.report.violations
         )
 
@@ -123,9 +117,11 @@ class Timer:
         tolerances: Tolerances,
         allow_unreachable: bool,
         steps: int,
+        checkpoint: Callable[[], None] | None = None,
     ) -> None:
         self._space, self._tolerances = space, tolerances
         self._allow_unreachable, self._steps = allow_unreachable, steps
+        self._checkpoint = checkpoint
 
     def signs(self, piece: PathPiece) -> tuple[int, ...]:
         """Return the representations that the vehicle has."""
@@ -160,7 +156,9 @@ class Timer:
                 free = [s for s, wrong in shape.faults.items() if wrong is None]
                 stuck = self._stuck(problem, piece, profiles[k, free[0]])
                 return self._no(path, TimingStatus.STUCK, stuck)
-        choice = self._choose(pieces, shapes, options)
+        choice = fastest_together(
+            pieces, shapes, options, self._space, self._tolerances
+        )
         if isinstance(choice, Fault):
             return self._no(path, NO_WAY, choice)
         chosen, waits = choice
@@ -222,60 +220,15 @@ class Timer:
         text = "can only be passed infinitely slowly"
         return Fault(row.limit, wheel, u, (x, y, theta), text)
 
-    def _choose(
-        self,
-        pieces: list[PathPiece],
-        shapes: list[PieceShape],
-        options: list[dict[int, PieceProfile]],
-    ) -> tuple[list[PieceProfile], list[float]] | Fault:
-        """Return the profiles that are fastest together, and the waits between them.
-
-        A short dynamic programme; among equals driving forwards comes first.
-        """
-        # Half the tolerance, as what `validate` measures differs by the sampling.
-        tolerances = replace(self._tolerances, alignment=self._tolerances.alignment / 2)
-        judge = judge_for(self._space, PathMotion(pieces[0], 1.0), tolerances)
-        changer = Changer(judge, self._space, tolerances)
-        best: dict[int, tuple[float, list[int], list[float]]] = {
-            sign: (_cost(profile), [sign], []) for sign, profile in options[0].items()
-        }
-        for i, option in enumerate(options[1:], start=1):
-            step: dict[int, tuple[float, list[int], list[float]]] = {}
-            for after, profile in option.items():
-                found = []
-                for before, (total, signs, waits) in best.items():
-                    change = changer.change(
-                        shapes[i - 1].ends[before][1], shapes[i].ends[after][0]
-                    )
-                    wait = min(way.time for way in change.ways)
-                    cost = total + wait + _cost(profile)
-                    found.append((cost, [*signs, after], [*waits, wait]))
-                quickest = min(found, key=lambda some: some[0])
-                if math.isfinite(quickest[0]):
-                    step[after] = quickest
-            if not step:
-                return _no_way(pieces[i])
-            best = step
-        _, signs, waits = min(best.values(), key=lambda some: some[0])
-        return [option[s] for option, s in zip(options, signs, strict=True)], waits
+    @property
+    def _footprint(self) -> Sequence[tuple[float, float]]:
+        assert self._space.vehicle is not None
+        return self._space.vehicle.footprint
 
     def _steps_of(self, piece: PathPiece) -> int:
         has_caps = bool(np.isfinite([piece.max_speed, piece.max_yaw_rate]).any())
         least = self._steps * (CAPPED if has_caps else 1)
         return max(least, PER_POSE * (piece.u.size - 1))
-
-    def _legs(self, sampled: list[SampledPiece], waits: list[float]) -> list[_Leg]:
-        """Return the samples of all pieces with the time at stops between them."""
-        assert self._space.vehicle is not None
-        footprint = self._space.vehicle.footprint
-        legs, now = [], 0.0
-        for one, wait in zip(sampled, [*waits, 0.0], strict=True):
-            poses = one.path.poses_at(one.u)
-            used = cap_use(one.t, one.u, one.path, poses, footprint)
-            t = now + one.t * max(one.excess, used, 1.0)
-            legs.append(_Leg(one.path, t, one.u))
-            now = float(t[-1]) + wait * (1 + 1e-6) + DWELL
-        return legs
 
     def _tried(
         self,
@@ -285,17 +238,17 @@ class Timer:
         chosen: list[PieceProfile],
     ) -> _Try:
         """Return a trajectory as it was judged; waits grow as it demands."""
-        legs = self._legs(sampled, waits)
-        one = self._weighed(_trajectory(path, legs), legs, chosen)
+        legs = legs_of(sampled, waits, self._footprint)
+        one = self._weighed(trajectory_of(path, legs), legs, chosen)
         for _ in range(WAITS):
-            if not _lengthened(waits, one):
+            if not lengthened(waits, one.legs, one.report):
                 break
-            legs = self._legs(sampled, waits)
-            one = self._weighed(_trajectory(path, legs), legs, chosen)
+            legs = legs_of(sampled, waits, self._footprint)
+            one = self._weighed(trajectory_of(path, legs), legs, chosen)
         return one
 
     def _weighed(
-        self, trajectory: Trajectory, legs: list[_Leg], chosen: list[PieceProfile]
+        self, trajectory: Trajectory, legs: list[Leg], chosen: list[PieceProfile]
     ) -> _Try:
         proved, report = self._judged(trajectory)
         spans, starts = proved.parts.spans, [leg.t[0] for leg in legs]
@@ -303,7 +256,7 @@ class Timer:
         sign = np.array([one.sigma for one in chosen], dtype=np.int64)[leg]
         slowdowns = slowdowns_of(proved, sign)
         for violation in report.violations:
-            factor = _crawl(violation, legs)
+            factor = crawl_of(violation, legs)
             if factor <= 1:
                 continue
             inside = (spans.t1 > violation.t_start) & (spans.t0 < violation.t_end)
@@ -318,6 +271,7 @@ class Timer:
             allow_unreachable=self._allow_unreachable,
             max_parts=PARTS,
             is_sharp=False,
+            checkpoint=self._checkpoint,
         )
         return proved, report_of(proved)
 
@@ -357,6 +311,7 @@ class Timer:
             self._space,
             self._tolerances,
             allow_unreachable=self._allow_unreachable,
+            checkpoint=self._checkpoint,
         )
 
     def _refused(self, path: Path, profile: SpeedProfile, report: Report) -> Timing:
@@ -377,17 +332,8 @@ class Timer:
         )
 
 
-def _trajectory(path: Path, legs: list[_Leg]) -> Trajectory:
-    return Trajectory.from_poses(
-        np.concatenate([leg.t for leg in legs]),
-        np.concatenate([leg.piece.poses_at(leg.u) for leg in legs]),
-        name=path.name,
-        reference_point=path.reference_point,
-    )
-
-
 def _tighter(
-    weight: FloatArray, sampler: PieceSampler, leg: _Leg, one: _Try
+    weight: FloatArray, sampler: PieceSampler, leg: Leg, one: _Try
 ) -> FloatArray:
     """Return tighter limits where they were broken, looser where they are not."""
     spans = one.proved.parts.spans
@@ -426,18 +372,6 @@ def _worth(timing: Timing) -> float:
     return math.inf if timing.duration is None else timing.duration
 
 
-def _cost(profile: PieceProfile) -> float:
-    """Return a profile's duration; among equals driving forwards is preferred."""
-    return profile.duration * (1 + 1e-9 * (profile.sigma < 0))
-
-
-def _no_way(piece: PathPiece) -> Fault:
-    u = float(piece.u[0])
-    x, y, theta = piece.poses_at(piece.u[:1])[0].tolist()
-    text = "at rest the wheels find no way to their new angles inside the space"
-    return Fault("RECONFIGURATION", None, u, (x, y, theta), text)
-
-
 def _joined(
     problem: TimingProblem,
     chosen: list[PieceProfile],
@@ -466,34 +400,3 @@ def _joined(
 def _locked(values: Array) -> Array:
     values.flags.writeable = False
     return values
-
-
-def _crawl(violation: Violation, legs: list[_Leg]) -> float:
-    """Return how many times more slowly wheels have to turn amid a leg, or 1.
-
-    Where the centre of rotation passes close by a wheel, even the optimum may be slow
-    enough to count as standing; then the wheels turn from rest to rest.
-    """
-    if violation.limit != "RECONFIGURATION" or violation.value is None:
-        return 1.0
-    ends = np.array([leg.t[-1] for leg in legs[:-1]])
-    is_stop = (violation.t_start <= ends) & (ends <= violation.t_end)
-    if is_stop.any() or not 0 < violation.bound < violation.value < math.inf:
-        return 1.0
-    return violation.value / violation.bound
-
-
-def _lengthened(waits: list[float], one: _Try) -> bool:
-    """Make waits at stops as long as a report demands; return whether any is."""
-    ends = np.array([leg.t[-1] for leg in one.legs[:-1]])
-    grew = False
-    for violation in one.report.violations:
-        if violation.limit != "RECONFIGURATION" or violation.value is None:
-            continue
-        since = np.where(ends <= violation.t_end, violation.t_end - ends, math.inf)
-        missing = violation.value - violation.bound
-        if not np.isfinite(since).any() or not 0 < missing < math.inf:
-            continue
-        waits[int(since.argmin())] += missing + DWELL
-        grew = True
-    return grew

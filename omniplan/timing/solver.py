@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from configspace import Vehicle
-from omniplan.timing.kernels import rows_along, time_jobs
+from omniplan.timing.kernels import time_jobs
 from omniplan.timing.path_motion import PathPiece
 from omniplan.timing.rounding import rounded
+from omniplan.timing.row_kernels import rows_along
 from omniplan.timing.rows import ONE_SIDED, RowKind, TimingRow, row_table, timing_rows
 
 __all__ = ["PieceProfile", "TimingProblem"]

@@ -102,7 +102,8 @@ def spaced(t: FloatArray, step: FloatArray, least: int = 4) -> FloatArray:
     at = np.linspace(0.0, passed[-1], n + 1)
     k = np.clip(np.searchsorted(passed, at, side="right") - 1, 0, t.size - 2)
     since = at - passed[k]
-    grown = np.where(is_flat[k], since, np.expm1(slope[k] * since) / slope[k])
+    bent = np.where(is_flat[k], 0.0, slope[k] * since)
+    grown = np.where(is_flat[k], since, np.expm1(bent) / slope[k])
     found = t[k] + step[k] * grown
     found[-1] = t[-1]
     return np.asarray(found)

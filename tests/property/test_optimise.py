@@ -103,6 +103,7 @@ def assert_mended(seed: int, name: str, mistake: Mistake) -> None:
         trajectory.t,
         random_motions.motion_of(trajectory),
         per_interval=2,
+        has_swing=True,
     )
     assert naive_limits.breaches(simulation) == []
 
@@ -130,6 +131,10 @@ def assert_improved(seed: int, kind: VehicleKind) -> None:
     if timing.trajectory is not None:
         assert trajectory.duration <= timing.trajectory.duration * (1 + 1e-9)
     simulation = naive_motion.simulate(
-        vehicle, trajectory.t, random_motions.motion_of(trajectory), per_interval=3
+        vehicle,
+        trajectory.t,
+        random_motions.motion_of(trajectory),
+        per_interval=3,
+        has_swing=True,
     )
     assert naive_limits.breaches(simulation) == []

@@ -10,12 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from timing_cases import (
     FloatArray,
+    assert_rests,
     demanding_vehicle,
     smooth_path,
     swinging_vehicle,
 )
 
-from configspace import Grid, PermissibleSpace, build_space
+from configspace import (
+    Grid,
+    PermissibleSpace,
+    Vehicle,
+    build_space,
+    vehicle_from_data,
+)
 from configspace.testing import VehicleKind
 from omniplan import Path, Timing, TimingStatus, Trajectory, time_path, validate
 from omniplan.judging.rows import Tolerances
@@ -39,6 +46,46 @@ def space_of(rng: np.random.Generator, kind: VehicleKind) -> PermissibleSpace:
 
 def timed(path: Path | Trajectory, space: PermissibleSpace) -> Timing:
     return time_path(path, space, grid=200, steps=250)
+
+
+def without_accelerations(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with limits on speeds and steering rates only."""
+    data = vehicle.model_dump(mode="json", exclude_none=True)
+    for limits in (data["limits"], *data["wheels"]):
+        for name in [name for name in limits if "celeration" in name]:
+            del limits[name]
+    return vehicle_from_data(data)
+
+
+def stopping_path(rng: np.random.Generator) -> tuple[Path, int]:
+    """A path with low caps beside some of its stops, and how many these are."""
+    path = smooth_path(rng)
+    runs = [path.poses[:: (-1) ** leg] for leg in range(int(rng.integers(1, 4)))]
+    poses = np.concatenate([runs[0], *(run[1:] for run in runs[1:])])
+    caps = np.full(len(poses) - 1, np.inf)
+    beside = np.arange(len(caps)) % (len(path.poses) - 1)
+    at_stop = (beside == 0) | (beside == len(path.poses) - 2)
+    slow = at_stop & (rng.random(caps.size) < 0.7)
+    caps[slow] = 10 ** rng.uniform(-2.5, 0, int(slow.sum()))
+    point = path.reference_point
+    slowed = Path.from_poses(poses, reference_point=point, max_speed=caps)
+    return slowed, len(runs) - 1
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(SEEDS, st.sampled_from(KINDS), st.booleans())
+def test_every_leg_is_from_rest_to_rest(
+    seed: int, kind: VehicleKind, is_free: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    vehicle = demanding_vehicle(rng, kind)
+    if is_free:
+        vehicle = without_accelerations(vehicle)
+    path, stops = stopping_path(rng)
+    space = build_space(vehicle, Grid(20, 36), cache=False)
+    timing = time_path(path, space, grid=200, steps=int(rng.integers(4, 100)))
+    if timing.trajectory is not None:
+        assert_rests(timing.trajectory, stops)
 
 
 @settings(max_examples=12, deadline=None, derandomize=True)

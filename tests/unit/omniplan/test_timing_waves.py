@@ -36,17 +36,37 @@ def random_knots(rng: np.random.Generator, last: float) -> FloatArray:
     return np.asarray(t * (last / t[-1]))
 
 
+def means(profile: PieceProfile, t: FloatArray) -> tuple[BSpline, float]:
+    """The quadratic B-spline of the speeds amid the steps, odd about both ends.
+
+    And by how much it has to be stretched to go as far as the profile does.
+    """
+    h = np.diff(t)
+    speed = np.interp((t[1:] + t[:-1]) / 2, profile.times, np.sqrt(profile.x))
+    before, after = t[0] - h[:2].cumsum()[::-1], t[-1] + h[[-1, -2]].cumsum()
+    spline = BSpline(
+        np.concatenate([before, t, after]),
+        np.concatenate([-speed[:1], speed, -speed[-1:]]),
+        2,
+    )
+    way = profile.u[-1] - profile.u[0]
+    return spline, way / float(spline.integrate(t[0], t[-1]))
+
+
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6))
 def test_constant_limits_are_kept_whatever_the_steps(seed: int) -> None:
     rng, profile = np.random.default_rng(seed), trapezoid()
-    wave = wave_of(profile, random_knots(rng, profile.duration))
-    t = rng.uniform(0.0, profile.duration, 500)
-    u, speed, change = wave.at(t)
-    # Stretched by what means of a speed lose where it peaks.
-    mean = (wave.speed[1:] + wave.speed[:-1]) / 2
-    assert mean.max() <= TOP * 1.2
-    stretch = wave.change.max() / PULL
+    knots = random_knots(rng, profile.duration)
+    wave = wave_of(profile, knots)
+    # Means of a concave speed are less. At every t their nodes lie up to 1.5 steps
+    # away with a variance of a quarter of a step's square at most; with the mean t a
+    # corner then lifts its mean by (√(variance + d²) - d) / 2, d away, at most.
+    _, stretch = means(profile, knots)
+    lost = 0.2883 * (PULL + BRAKE) * float(np.diff(knots).max()) ** 2
+    assert stretch >= 1 - 1e-9
+    assert stretch * (4.0 - lost) <= 4.0
+    u, speed, change = wave.at(rng.uniform(0.0, profile.duration, 500))
     assert (change <= PULL * stretch * (1 + 1e-9)).all()
     assert (change >= -BRAKE * stretch * (1 + 1e-9)).all()
     assert (speed >= 0).all()
@@ -57,22 +77,30 @@ def test_constant_limits_are_kept_whatever_the_steps(seed: int) -> None:
     assert wave.u[[0, -1]].tolist() == [0.0, 4.0]
 
 
+@pytest.mark.parametrize("n", [8, 13, 40])
+def test_by_even_steps_every_corner_loses_what_can_be_computed(n: int) -> None:
+    """Their integral is that of the midpoint rule less thirds of steps at the ends."""
+    profile = trapezoid(8000)  # with a node at both corners
+    last, h = profile.duration, profile.duration / n
+    wave = wave_of(profile, np.linspace(0.0, last, n + 1))
+    lost = 0.0
+    for corner, bend in ((TOP / PULL, PULL), (last - TOP / BRAKE, BRAKE)):
+        off_middle = abs(corner / h - np.floor(corner / h) - 0.5) * h
+        lost += bend * (h**2 / 6 - (h / 2 - off_middle) ** 2 / 2)
+    stretch = 4.0 / (4.0 - lost)
+    assert wave.change[0] == pytest.approx(PULL * stretch, rel=1e-6)
+    assert wave.change[-1] == pytest.approx(-BRAKE * stretch, rel=1e-6)
+    assert wave.speed.max() == pytest.approx(TOP * stretch, rel=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_it_is_the_quadratic_b_spline_of_the_speed(seed: int) -> None:
     rng, profile = np.random.default_rng(seed), trapezoid()
     t = random_knots(rng, profile.duration)
     wave = wave_of(profile, t)
-    middle = (t[1:] + t[:-1]) / 2
-    speed = np.interp(middle, profile.times, np.sqrt(profile.x))
-    h = np.diff(t)
-    knots = np.concatenate(
-        [t[0] - h[:2].cumsum()[::-1], t, t[-1] + h[[-1, -2]].cumsum()]
-    )
-    c = np.concatenate([-speed[:1], speed, -speed[-1:]])
-    naive = BSpline(knots, c, 2)
+    naive, stretch = means(profile, t)
     at = rng.uniform(0, profile.duration, 200)
-    way = naive.integrate(0.0, profile.duration)
-    np.testing.assert_allclose(wave.at(at)[1], naive(at) * 4.0 / way, atol=1e-9)
+    np.testing.assert_allclose(wave.at(at)[1], naive(at) * stretch, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -86,6 +114,14 @@ def test_it_is_twice_differentiable_and_its_samples_give_it_back(seed: int) -> N
         np.testing.assert_allclose(again(at, order), values, atol=1e-9)
     places = rng.uniform(0.01, 3.99, 20)
     np.testing.assert_allclose(wave.at(wave.passes(places))[0], places, atol=1e-12)
+
+
+def test_knots_are_laid_through_steps_of_very_different_sizes() -> None:
+    t = np.array([0.0, 1.0, 1001.0, 1002.0])
+    step = np.array([1e-3, 0.25, 0.25, 1e-3])
+    knots = spaced(t, step)
+    assert (np.diff(knots) > 0).all()
+    assert np.diff(knots).max() == pytest.approx(0.25, rel=1e-3)
 
 
 def test_with_short_steps_it_is_the_profile() -> None:
