@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +16,16 @@ from configspace import InvalidInput, Problem
 from omniplan.obstacles.polygons import Geometries
 from omniplan.samples import MAX_VALUE
 
-__all__ = ["checked_bounds", "checked_clearance", "not_finite", "walls"]
+__all__ = [
+    "checked_bounds",
+    "checked_clearance",
+    "checked_path",
+    "checked_poses",
+    "is_pose",
+    "not_a_motion",
+    "not_a_pose",
+    "walls",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -38,9 +50,11 @@ def walls(bounds: Bounds | None) -> Geometries:
 
 def checked_clearance(clearance: float) -> float:
     """Return a distance to keep, or raise."""
-    if not (math.isfinite(clearance) and 0 <= clearance <= MAX_VALUE):
+    is_number = isinstance(clearance, SupportsFloat)
+    if not (is_number and 0 <= float(clearance) <= MAX_VALUE):
+        given = f"{clearance}" if is_number else repr(clearance)[:60]
         allowed = "a finite distance of at least 0 m"
-        raise InvalidInput(Problem("clearance", f"{clearance}", allowed))
+        raise InvalidInput(Problem("clearance", given, allowed))
     return float(clearance)
 
 
@@ -59,7 +73,51 @@ def checked_bounds(given: Sequence[float]) -> Bounds:
     return x0, y0, x1, y1
 
 
-def not_finite(pose: Sequence[float] | FloatArray) -> InvalidInput:
+def is_pose(x: float, y: float, theta: float) -> bool:
+    """Return whether a vehicle can be asked about at a pose."""
+    return (
+        -MAX_VALUE <= x <= MAX_VALUE
+        and -MAX_VALUE <= y <= MAX_VALUE
+        and math.isfinite(theta)
+    )
+
+
+def checked_poses(given: npt.ArrayLike) -> FloatArray:
+    """Return poses (n, 3), or raise."""
+    try:
+        poses = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise not_a_pose(given) from error
+    if poses.shape == (0,):
+        poses = poses.reshape(0, 3)
+    if poses.ndim != 2 or poses.shape[1] != 3:
+        allowed = "poses (n, 3): x, y and θ each"
+        raise InvalidInput(Problem("poses", f"shape {poses.shape}", allowed))
+    right = np.isfinite(poses[:, 2]) & (np.abs(poses[:, :2]) <= MAX_VALUE).all(axis=1)
+    if not right.all():
+        raise not_a_pose(poses[~right][0])
+    return poses
+
+
+def not_a_pose(pose: Any) -> InvalidInput:
     """Return the error of a pose."""
-    shown = ", ".join(f"{float(value):g}" for value in pose)
-    return InvalidInput(Problem("pose", f"({shown})", "finite numbers"))
+    try:
+        shown = f"({', '.join(f'{float(value):g}' for value in pose)})"
+    except (TypeError, ValueError):
+        shown = repr(pose)[:60]
+    allowed = f"finite numbers (x, y, θ), x and y of at most {MAX_VALUE:g} m"
+    return InvalidInput(Problem("pose", shown, allowed))
+
+
+def not_a_motion(given: object) -> InvalidInput:
+    """Return the error of a motion."""
+    allowed = "a Move, or anything with start, goal, length, turn and poses"
+    return InvalidInput(Problem("motion", type(given).__name__, allowed))
+
+
+def checked_path(given: object, what: str) -> Path:
+    """Return the path of a file, or raise."""
+    if not isinstance(given, str | os.PathLike):
+        allowed = "the path of a file"
+        raise InvalidInput(Problem(what, type(given).__name__, allowed))
+    return Path(given)

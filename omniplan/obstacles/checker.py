@@ -14,20 +14,29 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from configspace import Problem
+from configspace import InvalidInput, PermissibleSpace, Problem
 from omniplan.errors import InvalidTrajectory
 from omniplan.motion import PoseMotion, motion_of
 from omniplan.obstacles.asked import (
     checked_bounds,
     checked_clearance,
-    not_finite,
+    checked_poses,
+    is_pose,
+    not_a_motion,
+    not_a_pose,
     walls,
 )
-from omniplan.obstacles.broad import Broad, OpenFloor
-from omniplan.obstacles.footprint import Body, Footprint, footprint_of
+from omniplan.obstacles.broad import Broad
+from omniplan.obstacles.footprint import (
+    Body,
+    Footprint,
+    footprint_of,
+    require_body_of,
+)
 from omniplan.obstacles.hit import Hit
 from omniplan.obstacles.narrow import Narrow
 from omniplan.obstacles.obstacles import Obstacles
+from omniplan.obstacles.open_floor import OpenFloor
 from omniplan.obstacles.sweep import (
     MAX_TURN,
     ConstantSpeed,
@@ -36,6 +45,7 @@ from omniplan.obstacles.sweep import (
     Way,
     swept_by,
 )
+from omniplan.samples import MAX_VALUE
 from omniplan.trajectory import Trajectory, timed
 
 __all__ = ["CollisionChecker"]
@@ -90,6 +100,9 @@ class CollisionChecker:
         bounds: Sequence[float] | None = None,
     ) -> None:
         self._body = body
+        if not isinstance(obstacles, Obstacles | None):
+            allowed = "Obstacles, such as Obstacles.from_polygons makes"
+            raise InvalidInput(Problem("obstacles", type(obstacles).__name__, allowed))
         self.obstacles = Obstacles() if obstacles is None else obstacles
         self.clearance = checked_clearance(clearance)
         self.bounds = None if bounds is None else checked_bounds(bounds)
@@ -107,11 +120,18 @@ class CollisionChecker:
 
     @property
     def open_floor(self) -> OpenFloor:
-        """The cells known to be free whatever the heading, for whoever asks often.
+        """Where it is known to be free whatever the heading, for whoever asks often.
 
-        They become more as poses are asked for.
+        It grows as poses are asked for.
         """
         return self._broad.open_floor
+
+    def require_body_of(self, space: PermissibleSpace) -> None:
+        """Raise InvalidInput if this checks another vehicle than that of a space.
+
+        A checker made of a polygon may check any vehicle.
+        """
+        require_body_of(self._body, space)
 
     def with_clearance(self, clearance: float) -> CollisionChecker:
         """Return a checker that keeps another distance from the same things.
@@ -130,9 +150,15 @@ class CollisionChecker:
         pose : (3,) float, m, m, rad
             (x, y, θ) of K.
         """
-        x, y, theta = pose
-        if not math.isfinite(x + y + theta):
-            raise not_finite(pose)
+        try:
+            x, y, theta = pose
+            is_right = is_pose(x, y, theta)
+        except (TypeError, ValueError) as error:
+            raise not_a_pose(pose) from error
+        if not is_right:
+            raise not_a_pose(pose)
+        if (x, y) in self._broad.open_floor:
+            return True
         nearby = self._broad.at(x, y)
         if nearby.gap > self._ball:
             return True
@@ -154,8 +180,11 @@ class CollisionChecker:
         x0, y0, x1, y1 : float, m
             From where to where K moves.
         """
-        if not math.isfinite(x0 + y0 + x1 + y1):
-            raise not_finite((x0, y0) if not math.isfinite(x0 + y0) else (x1, y1))
+        limit = MAX_VALUE
+        if not (-limit <= x0 <= limit and -limit <= y0 <= limit):
+            raise not_a_pose((x0, y0))
+        if not (-limit <= x1 <= limit and -limit <= y1 <= limit):
+            raise not_a_pose((x1, y1))
         return self._broad.is_clear(x0, y0, x1, y1, self._ball)
 
     def are_free(self, poses: npt.ArrayLike) -> BoolArray:
@@ -169,19 +198,19 @@ class CollisionChecker:
         -------
         free : (n,) bool
         """
-        at = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
-        if not np.isfinite(at).all():
-            raise not_finite(at[~np.isfinite(at).all(axis=1)][0])
-        return ~self._narrow.touching(self.footprint, at)
+        return ~self._narrow.touching(self.footprint, checked_poses(poses))
 
     def distance(self, pose: Sequence[float] | FloatArray) -> float:
         """Return the distance of the footprint to the nearest obstacle, m; 0 if hit.
 
         The border of the bounds counts as an obstacle. Infinite if there is none.
         """
-        x, y, theta = (float(value) for value in pose)
-        if not math.isfinite(x + y + theta):
-            raise not_finite(pose)
+        try:
+            x, y, theta = (float(value) for value in pose)
+        except (TypeError, ValueError) as error:
+            raise not_a_pose(pose) from error
+        if not is_pose(x, y, theta):
+            raise not_a_pose(pose)
         return self._narrow.nearest(self.footprint, (x, y, theta))[0]
 
     def hit_at(self, pose: Sequence[float] | FloatArray) -> Hit | None:
@@ -206,11 +235,16 @@ class CollisionChecker:
             True is proved for every pose in between. Where the proof would have to
             look at parts in which no point moves by `UNDECIDED`, the answer is False.
         """
-        x0, y0, theta0 = (float(value) for value in motion.start)
-        x1, y1, theta1 = (float(value) for value in motion.goal)
-        turn, length = float(motion.turn), float(motion.length)
-        if not math.isfinite(x0 + y0 + theta0 + x1 + y1 + theta1 + turn + length):
-            raise not_finite((x0, y0, theta0))
+        try:
+            x0, y0, theta0 = (float(value) for value in motion.start)
+            x1, y1, theta1 = (float(value) for value in motion.goal)
+            turn, length = float(motion.turn), float(motion.length)
+        except (AttributeError, TypeError, ValueError) as error:
+            raise not_a_motion(motion) from error
+        if not (is_pose(x0, y0, theta0) and math.isfinite(turn + length)):
+            raise not_a_pose((x0, y0, theta0))
+        if not is_pose(x1, y1, theta1):
+            raise not_a_pose((x1, y1, theta1))
         # K keeps so near to the chord: the ellipse around both ends is no higher.
         chord = math.hypot(x1 - x0, y1 - y0)
         room = math.sqrt(max(length**2 - chord**2, 0.0)) / 2
@@ -298,7 +332,11 @@ class CollisionChecker:
         """
         if isinstance(motion, Trajectory):
             return swept_by(*self._course_of(motion))
-        return swept_by(ConstantSpeed(motion), self.footprint)
+        try:
+            course = ConstantSpeed(motion)
+        except (AttributeError, TypeError) as error:
+            raise not_a_motion(motion) from error
+        return swept_by(course, self.footprint)
 
     def swept_area(self, motion: Way | Trajectory) -> float:
         """Return the size of the area the footprint sweeps over, m²."""

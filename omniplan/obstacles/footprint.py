@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -9,14 +10,19 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 import shapely
+from shapely.geometry import Polygon
 
 from configspace import InvalidInput, PermissibleSpace, Problem, Vehicle
 from omniplan.obstacles.polygons import Geometries, checked_polygon, convex_parts
 
-__all__ = ["Body", "Footprint", "footprint_of"]
+__all__ = ["Body", "Footprint", "footprint_of", "require_body_of"]
 
 ComplexArray = npt.NDArray[np.complex128]
 Body: TypeAlias = Vehicle | PermissibleSpace | npt.ArrayLike
+Corners: TypeAlias = Sequence[tuple[float, float]]
+
+_SAME = 1e-9
+"""Reference points that agree to this are the same, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +55,10 @@ def footprint_of(body: Body) -> tuple[Footprint, complex]:
     InvalidInput
         If the vehicle has no footprint or the polygon cannot be used.
     """
-    if isinstance(body, Vehicle):
-        name, corners, k = body.name, body.footprint, body.reference
-    elif isinstance(body, PermissibleSpace):
-        name, corners = body.name, body.header.footprint
-        k = complex(*body.header.reference)
-    else:
+    known = _known(body)
+    if known is None:
         return _footprint("footprint", body), 0j
+    name, corners, k = known
     if not corners:
         # Wheels tell nothing of the body around them: a guess could be too small.
         allowed = (
@@ -64,6 +67,40 @@ def footprint_of(body: Body) -> tuple[Footprint, complex]:
         )
         raise InvalidInput(Problem(f"vehicle {name}: footprint", "none", allowed))
     return _footprint(f"vehicle {name}: footprint", corners), k
+
+
+def require_body_of(body: Body, space: PermissibleSpace) -> None:
+    """Raise InvalidInput if a body is that of another vehicle than a space.
+
+    A bare polygon may be anybody's.
+    """
+    theirs, ours = _known(body), _known(space)
+    if body is space or theirs is None or ours is None:
+        return
+    is_same = abs(theirs[2] - ours[2]) <= _SAME and (
+        shapely.equals(Polygon(theirs[1]), Polygon(ours[1]))
+        if ours[1]
+        else theirs[0] == ours[0]  # a space that tells no footprint
+    )
+    if not is_same:
+        given = (
+            f"checks vehicle {theirs[0]}, whose footprint or reference point differs"
+        )
+        allowed = f"a CollisionChecker of vehicle {ours[0]}"
+        raise InvalidInput(Problem("checker", given, allowed))
+
+
+def _known(body: Body) -> tuple[str, Corners, complex] | None:
+    """Return name, corners and K of a vehicle or a space, in the vehicle file's frame.
+
+    None for a polygon.
+    """
+    if isinstance(body, Vehicle):
+        return body.name, body.footprint or (), body.reference
+    if isinstance(body, PermissibleSpace):
+        k = complex(*body.header.reference)
+        return body.name, body.header.footprint, k
+    return None
 
 
 def _footprint(where: str, corners: object) -> Footprint:

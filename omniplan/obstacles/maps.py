@@ -75,6 +75,13 @@ def read_map(path: Path, *, unknown_is_free: bool) -> Geometries:
         allowed = f"at most {MAX_RECTANGLES}; is it a map?"
         raise InvalidInput(Problem("image", given, allowed), f"map {path}")
     size, height = header.resolution, len(level)
+    far = max(map(abs, header.origin[:2])) + size * math.hypot(*level.shape)
+    if far > MAX_VALUE:
+        given = (
+            f"{level.shape[1]} × {height} cells of {size:g} m, origin {header.origin}"
+        )
+        allowed = f"a map within {MAX_VALUE:g} m of the axes"
+        raise InvalidInput(Problem("resolution", given, allowed), f"map {path}")
     boxes = shapely.box(
         left * size, (height - bottom) * size, right * size, (height - top) * size
     )
@@ -157,6 +164,10 @@ def _problems(data: dict[Any, Any]) -> Iterator[Problem]:
         yield Problem("free_thresh", given, "at most occupied_thresh")
 
 
+_PIXELS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA"}
+"""Kinds of pixels, as Pillow names them, whose white is known."""
+
+
 def _is_share(value: object) -> bool:
     return _is_number(value, 0.0, 1.0)
 
@@ -198,13 +209,12 @@ def _levels(header: _Header) -> tuple[npt.NDArray[np.integer[Any]], int]:
                 width, height = picture.size
                 if width * height > MAX_CELLS:
                     raise _TooLarge(f"{width} × {height} cells")
-                return _brightness(picture)
+                return _brightness(picture, header.negate)
     except (_TooLarge, Image.DecompressionBombError) as error:
         problem = Problem("image", str(error)[:200], f"at most {MAX_CELLS} cells")
         raise InvalidInput(problem, subject) from error
-    except _Transparent as error:
-        problem = Problem("image", "transparent cells", "a picture without alpha")
-        raise InvalidInput(problem, subject) from error
+    except (_Transparent, _OtherPixels) as error:
+        raise InvalidInput(Problem("image", *error.args), subject) from error
     except (OSError, SyntaxError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)[:200]
         problem = Problem("image", reason, "a readable PNG or PGM picture")
@@ -219,13 +229,29 @@ class _Transparent(Exception):
     """Map servers disagree on it: some add opacity to the mean, some transparency."""
 
 
-def _brightness(picture: Image.Image) -> tuple[npt.NDArray[np.integer[Any]], int]:
+class _OtherPixels(Exception):
+    """Nobody says what is white: numbers of 32 bits, printing colours."""
+
+
+def _brightness(
+    picture: Image.Image, negate: bool
+) -> tuple[npt.NDArray[np.integer[Any]], int]:
     """Return the brightness of every cell, of colours the sum, and that of white."""
-    if picture.mode.startswith("I"):  # 16 bits
+    # Pillow widens 16 bits of PNG and PGM to 32, scaled to 65535.
+    is_wide = picture.mode == "I" and picture.format in ("PNG", "PPM")
+    if is_wide or picture.mode.startswith("I;16"):
         return np.asarray(picture).astype(np.uint16), 65535
+    if picture.mode not in _PIXELS:
+        allowed = f"8 or 16 bits of grey, or colours: {', '.join(sorted(_PIXELS))}"
+        raise _OtherPixels(f"pixels of kind {picture.mode}", allowed)
     if picture.mode in ("1", "L"):
         return np.asarray(picture.convert("L")), 255
     colours = np.asarray(picture.convert("RGBA"))
     if (colours[..., 3] < 255).any():
-        raise _Transparent
+        raise _Transparent("transparent cells", "a picture without alpha")
+    # Servers count an opaque alpha as one more white channel. Without it cells are
+    # darker: no more are free, but for this.
+    if negate and picture.mode in ("LA", "PA", "RGBA"):
+        given = "alpha, with negate, which map servers count as brightness"
+        raise _Transparent(given, "a picture without alpha")
     return colours[..., :3].sum(axis=-1, dtype=np.uint16), 3 * 255

@@ -9,15 +9,15 @@ but for the rounding of the cuts.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator
-from typing import Protocol
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from shapely.geometry import LinearRing, Polygon
 
 from configspace import InvalidInput, Problem
 from omniplan.obstacles.polygons import Area, Geometries, joined, polygonal
@@ -27,6 +27,10 @@ __all__ = ["Mesh", "shadow"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+_ASKED = 64
+"""So many faces of a body turned inside out are asked whether they are in a solid."""
 
 
 class Mesh(Protocol):
@@ -62,10 +66,12 @@ def shadow(name: str, mesh: Mesh, heights: tuple[float, float]) -> Area:
     Raises
     ------
     InvalidInput
-        If the mesh is open or not finite or the heights are not in order.
+        If the mesh is open, turned inside out, no triangles or not finite, or the
+        heights are not in order.
     """
     low, high = _checked_heights(heights)
     vertices, faces = _checked_mesh(name, mesh)
+    solids = _solids(name, vertices, _bodies(len(vertices), faces))
     z = vertices[:, 2][faces]
     inside = (z.max(axis=1) >= low) & (z.min(axis=1) <= high)
     near = vertices[faces[inside]]
@@ -78,13 +84,16 @@ def shadow(name: str, mesh: Mesh, heights: tuple[float, float]) -> Area:
     flat = _array(areas)
     # Upright faces have no area; they are the border of what is found elsewhere.
     flat = flat[shapely.area(flat) > 0] if flat.size else flat
-    return polygonal(shapely.union(joined(flat), _section(vertices, faces, high)))
+    return polygonal(shapely.union(joined(flat), _section(vertices, solids, high)))
 
 
 def _checked_heights(heights: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(x) for x in heights)
+    allowed = "two finite heights, the lower one first"
+    try:
+        low, high = (float(x) for x in heights)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(Problem("heights", repr(heights)[:60], allowed)) from error
     if not -MAX_VALUE <= low < high <= MAX_VALUE:
-        allowed = "two finite heights, the lower one first"
         raise InvalidInput(Problem("heights", f"({low:g}, {high:g}) m", allowed))
     return low, high
 
@@ -94,8 +103,7 @@ def _checked_mesh(name: str, mesh: Mesh) -> tuple[FloatArray, IntArray]:
     if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
         allowed = "a trimesh.Trimesh, or anything with vertices and faces"
         raise InvalidInput(Problem(name, repr(mesh)[:60], allowed))
-    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
-    faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    vertices, faces = _arrays(name, mesh)
     if not len(faces):
         raise InvalidInput(Problem(name, "a mesh without faces", "a closed solid"))
     bad = np.flatnonzero(~(np.abs(vertices) <= MAX_VALUE).all(axis=1))
@@ -116,6 +124,29 @@ def _checked_mesh(name: str, mesh: Mesh) -> tuple[FloatArray, IntArray]:
         raise InvalidInput(
             Problem(name, f"{given}one at ({x:g}, {y:g}, {z:g})", allowed)
         )
+    return vertices, faces
+
+
+def _arrays(name: str, mesh: Mesh) -> tuple[FloatArray, IntArray]:
+    """Return vertices (n, 3) and faces (m, 3), or raise."""
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    for what, found, kinds, allowed in (
+        ("vertices", vertices, "iuf", "numbers (n, 3)"),
+        ("faces", faces, "iu", "triangles: indices of vertices (m, 3)"),
+    ):
+        if not found.size:
+            continue
+        is_right = found.ndim == 2 and found.shape[1] == 3
+        if not is_right or found.dtype.kind not in kinds:
+            given = f"{what} of shape {found.shape}, {found.dtype}"
+            raise InvalidInput(Problem(name, given, allowed))
+    vertices = vertices.astype(np.float64).reshape(-1, 3)
+    faces = faces.astype(np.int64).reshape(-1, 3)
+    bad = np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))
+    if bad.size:
+        given = f"face {bad[0]} of vertices {faces[bad[0]].tolist()}"
+        allowed = f"indices of vertices from 0 to {len(vertices) - 1}"
+        raise InvalidInput(Problem(name, given, allowed))
     return vertices, faces
 
 
@@ -150,25 +181,114 @@ def _clipped(polygon: FloatArray, axis: int, level: float, side: int) -> FloatAr
     return np.array(kept).reshape(-1, 3)
 
 
-def _section(vertices: FloatArray, faces: IntArray, level: float) -> Area:
-    """Return the horizontal section: of bodies, without their cavities."""
-    links = coo_array(
-        (np.ones(3 * len(faces)), _sides(faces).T), shape=(len(vertices),) * 2
-    )
+def _bodies(n: int, faces: IntArray) -> list[IntArray]:
+    """Return the faces of every body: of vertices that hang together, of n."""
+    links = coo_array((np.ones(3 * len(faces)), _sides(faces).T), shape=(n, n))
     _, body = connected_components(links, directed=False)
-    solid: list[Area] = []
-    hollow: list[Area] = []
-    for each in np.unique(body[faces[:, 0]]):
-        own = faces[body[faces[:, 0]] == each]
-        rings = list(_loops(vertices, own, level))
-        if rings:
-            filled = shapely.make_valid(
-                shapely.polygons(rings), method="structure", keep_collapsed=False
-            )
-            area = polygonal(functools.reduce(shapely.symmetric_difference, filled))
-            (solid if _volume(vertices, own) > 0 else hollow).append(area)
-    cavities = joined(_array(hollow))
-    return polygonal(shapely.difference(joined(_array(solid)), cavities))
+    order = np.argsort(body[faces[:, 0]], kind="stable")
+    begins = np.flatnonzero(np.diff(body[faces[order, 0]])) + 1
+    return np.split(faces[order], begins)
+
+
+class _Solid(NamedTuple):
+    """A body and the cavities in it."""
+
+    faces: IntArray
+    cavities: list[IntArray]
+
+
+def _solids(
+    name: str, vertices: FloatArray, bodies: Sequence[IntArray]
+) -> list[_Solid]:
+    """Return the bodies with their cavities: those turned inside out, or raise.
+
+    A cavity is one of the smallest solid around it; what stands in it stays. One that
+    only several solids together surround is filled up.
+    """
+    volumes = [_volume(vertices, own) for own in bodies]
+    corners = [vertices[own].reshape(-1, 3) for own in bodies]
+    low = np.array([each.min(axis=0) for each in corners])
+    high = np.array([each.max(axis=0) for each in corners])
+    found = {i: _Solid(own, []) for i, own in enumerate(bodies) if volumes[i] >= 0}
+    for i, own in enumerate(bodies):
+        if i in found:
+            continue
+        middles = vertices[own[:: len(own) // _ASKED + 1]].mean(axis=1)
+        meets = ((low <= high[i]) & (high >= low[i])).all(axis=1)
+        meets[i] = False
+        turns = {
+            k: _winding(vertices[bodies[k]], middles)
+            for k in np.flatnonzero(meets).tolist()
+        }
+        total = np.sum([np.zeros(len(middles)), *turns.values()], axis=0)
+        if total.min() < 0.5:
+            x, y, z = middles[np.argmin(total)].tolist()
+            given = f"faces turned inwards, one at ({x:g}, {y:g}, {z:g}), in no solid"
+            allowed = "a closed solid whose faces are all turned outwards"
+            raise InvalidInput(Problem(name, given, allowed))
+        around = [k for k in turns if k in found and turns[k].min() > 0.5]
+        if around:
+            found[min(around, key=volumes.__getitem__)].cavities.append(own)
+    return list(found.values())
+
+
+def _winding(triangles: FloatArray, points: FloatArray) -> FloatArray:
+    """Return how often a surface (m, 3, 3) winds around points (n, 3): 1 inside.
+
+    The sum of solid angles, by the formula of van Oosterom and Strackee.
+    """
+    found = np.empty(len(points))
+    for i, point in enumerate(points):
+        a, b, c = np.moveaxis(triangles - point, 1, 0)
+        la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+        inside = (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+        volume = (a * np.cross(b, c)).sum(1)
+        found[i] = np.arctan2(volume, la * lb * lc + inside).sum() / (2 * np.pi)
+    return found
+
+
+def _section(vertices: FloatArray, solids: Sequence[_Solid], level: float) -> Area:
+    """Return the horizontal section: of solids, each without its cavities."""
+    found = []
+    for solid in solids:
+        # What a surface that crosses itself turns inside out counts as solid, too.
+        area = _wound(vertices, solid.faces, level, (-1, 1))
+        voids = [_wound(vertices, own, level, (1,)) for own in solid.cavities]
+        found.append(polygonal(shapely.difference(area, joined(_array(voids)))))
+    return joined(_array(found))
+
+
+def _wound(
+    vertices: FloatArray, faces: IntArray, level: float, signs: tuple[int, ...]
+) -> Area:
+    """Return around what the lines wind in which a body meets a level.
+
+    Where a body overlaps itself its lines wind twice. They run clockwise (-1) around
+    what is inside faces that look outwards.
+    """
+    rings = list(_loops(vertices, faces, level))
+    if not rings:
+        return Polygon()
+    if len(rings) == 1:
+        alone = Polygon(rings[0])
+        if alone.is_valid:
+            is_kept = (1 if alone.exterior.is_ccw else -1) in signs
+            return alone if is_kept else Polygon()
+    lines = shapely.get_parts(shapely.union_all(list(map(LinearRing, rings))))
+    cells = shapely.get_parts(shapely.polygonize(lines))
+    points = shapely.get_coordinates(shapely.point_on_surface(cells))
+    turns = sum((_turns(ring, points) for ring in rings), start=np.zeros(len(points)))
+    return joined(cells[np.isin(np.sign(turns), signs)])
+
+
+def _turns(ring: FloatArray, points: FloatArray) -> FloatArray:
+    """Return how often a closed line (n, 2) winds around points, counter-clockwise."""
+    a, b = ring[:-1], ring[1:]
+    x, y = points[:, :1], points[:, 1:]
+    side = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (x - a[:, 0]) * (b[:, 1] - a[:, 1])
+    up = (a[:, 1] <= y) & (b[:, 1] > y) & (side > 0)
+    down = (a[:, 1] > y) & (b[:, 1] <= y) & (side < 0)
+    return np.asarray(up.sum(axis=1) - down.sum(axis=1), dtype=np.float64)
 
 
 def _array(areas: list[Area]) -> Geometries:
@@ -182,10 +302,8 @@ def _volume(vertices: FloatArray, faces: IntArray) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-def _loops(
-    vertices: FloatArray, faces: IntArray, level: float
-) -> Iterator[shapely.LinearRing]:
-    """Yield the closed lines in which a closed surface meets a level.
+def _loops(vertices: FloatArray, faces: IntArray, level: float) -> Iterator[FloatArray]:
+    """Yield the closed lines (n, 2) in which a closed surface meets a level.
 
     Corners at the level count as above it, so a face is met in two sides or in none,
     and every side that is met belongs to two faces: lines close without tolerance.
@@ -218,4 +336,4 @@ def _loops(
             at = next_of.pop(at)
         ring.append(ring[0])
         if len(ring) > 3:
-            yield shapely.linearrings(ring)
+            yield np.array(ring)

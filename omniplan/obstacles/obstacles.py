@@ -15,6 +15,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 from configspace import InvalidInput, Problem
+from omniplan.obstacles.asked import checked_path
 from omniplan.obstacles.maps import read_map
 from omniplan.obstacles.meshes import Mesh, shadow
 from omniplan.obstacles.polygons import (
@@ -115,7 +116,8 @@ class Obstacles:
         """
         subject = f"obstacle file {path}"
         try:
-            data = json.loads(Path(path).read_text("utf-8"))
+            text = checked_path(path, "obstacle file").read_text("utf-8")
+            data = json.loads(text, object_pairs_hook=_once_each)
         except (OSError, ValueError, RecursionError) as error:
             reason = getattr(error, "strerror", None) or str(error)[:200]
             problem = Problem("the file", reason, "a readable JSON file")
@@ -133,13 +135,13 @@ class Obstacles:
 
     @classmethod
     def from_meshes(
-        cls, meshes: Sequence[Mesh] | Mapping[str, Mesh], heights: tuple[float, float]
+        cls, meshes: Iterable[Mesh] | Mapping[str, Mesh], heights: tuple[float, float]
     ) -> Obstacles:
         """Return solids as obstacles: the shadow of what lies between two heights.
 
         Parameters
         ----------
-        meshes : sequence or mapping from names
+        meshes : iterable or mapping from names
             ``trimesh.Trimesh`` or whatever has ``vertices`` (n, 3) in m and
             ``faces`` (m, 3); closed, z up, in the world frame.
         heights : (float, float), m
@@ -149,14 +151,16 @@ class Obstacles:
         Raises
         ------
         InvalidInput
-            If a mesh is open or has coordinates that are not finite, or the heights are
-            not in order.
+            If a mesh is open, turned inside out, or has coordinates that are not
+            finite, or the heights are not in order.
         """
-        named: dict[str, Mesh] = (
-            dict(meshes)
-            if isinstance(meshes, Mapping)
-            else {f"mesh {i}": mesh for i, mesh in enumerate(meshes)}
-        )
+        if isinstance(meshes, Mapping):
+            named: dict[str, Mesh] = dict(meshes)
+        elif not isinstance(meshes, Iterable):
+            allowed = "a list of meshes, or a mapping from names to meshes"
+            raise InvalidInput(Problem("meshes", type(meshes).__name__, allowed))
+        else:
+            named = {f"mesh {i}": mesh for i, mesh in enumerate(meshes)}
         shadows = {name: shadow(name, mesh, heights) for name, mesh in named.items()}
         kept = {name: area for name, area in shadows.items() if not area.is_empty}
         return cls._of(list(kept), [_parts(area) for area in kept.values()])
@@ -188,10 +192,11 @@ class Obstacles:
         Cells are kept as rectangles without loss: runs of a row, joined with equal runs
         of the rows beside it. A map without occupied cells is an empty value.
         """
-        rectangles = read_map(Path(path), unknown_is_free=unknown_is_free)
+        path = checked_path(path, "map")
+        rectangles = read_map(path, unknown_is_free=unknown_is_free)
         if not rectangles.size:
             return cls()
-        return cls._of([name or Path(path).name], [rectangles])
+        return cls._of([name or path.name], [rectangles])
 
     @classmethod
     def _of(cls, names: Sequence[str], pieces: Sequence[Geometries]) -> Obstacles:
@@ -238,6 +243,16 @@ class Obstacles:
             rings_of(joined(own) if len(own) <= JOINED else MultiPolygon(own.tolist()))
             for own in owned
         )
+
+
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a mapping of a file; of two obstacles of one name none is lost."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {twice!r} stands twice")
+    return found
 
 
 def _parts(area: Area) -> Geometries:

@@ -80,7 +80,11 @@ def _reject_large(where: str, corners: FloatArray) -> None:
 def _corners(where: str, given: Any) -> FloatArray:
     allowed = "corners (n, 2) in m, n of at least 3"
     try:
-        corners = np.array(given, dtype=np.float64)
+        found = np.array(given)
+        # Words and truth values could be read as numbers.
+        if found.size and found.dtype.kind not in "iuf":
+            raise TypeError("not numbers")
+        corners = found.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise _invalid(where, repr(given)[:60], allowed) from error
     if corners.ndim != 2 or corners.shape[1] != 2:

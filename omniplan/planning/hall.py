@@ -45,6 +45,7 @@ def checkers(
         if bounds is not None or clearance != 0.0:
             allowed = "a CollisionChecker brings its own bounds and clearance"
             raise InvalidInput(Problem("bounds, clearance", "given as well", allowed))
+        obstacles.require_body_of(space)
         strict = obstacles
     elif obstacles is None and bounds is None:
         return None, None

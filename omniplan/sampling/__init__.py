@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from omniplan.sampling.intervals import PermittedIntervals
     from omniplan.sampling.line_radius import least_radius
-    from omniplan.sampling.ompl_bindings import (
-        Collisions,
+    from omniplan.sampling.motion_validity import (
         MotionValidator,
-        StateValidityChecker,
-        bounds_of,
         equip,
-        line_space,
         motion_validator,
-        seeded,
+    )
+    from omniplan.sampling.ompl_bindings import bounds_of, seeded
+    from omniplan.sampling.state_spaces import line_space
+    from omniplan.sampling.state_validity import (
+        Collisions,
+        StateValidityChecker,
         validity_checker,
     )
 
@@ -39,14 +40,25 @@ __all__ = [
     "validity_checker",
 ]
 
-_HOMES = {"PermittedIntervals": "intervals", "least_radius": "line_radius"}
+_HOMES = {
+    "Collisions": "state_validity",
+    "MotionValidator": "motion_validity",
+    "PermittedIntervals": "intervals",
+    "StateValidityChecker": "state_validity",
+    "bounds_of": "ompl_bindings",
+    "equip": "motion_validity",
+    "least_radius": "line_radius",
+    "line_space": "state_spaces",
+    "motion_validator": "motion_validity",
+    "seeded": "ompl_bindings",
+    "validity_checker": "state_validity",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = _HOMES.get(name, "ompl_bindings")
-    value = getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    value = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 

@@ -84,22 +84,36 @@ def test_what_is_clear_at_a_glance_is_free_whatever_the_heading(
     assert size < 40 or clear > 0
 
 
-@given(seed=seeds)
+@given(seed=seeds, bounded=st.booleans())
 @settings(max_examples=10, deadline=None)
-def test_open_floor_is_free(seed: int) -> None:
+def test_open_floor_is_free(seed: int, bounded: bool) -> None:
     rng = np.random.default_rng(seed)
     polygons = hall(rng, size=20.0)
-    checker = CollisionChecker(BOX, Obstacles.from_polygons(polygons), 0.1)
+    walls = (-0.5, -0.5, 20.5, 20.5) if bounded else None
+    checker = CollisionChecker(BOX, Obstacles.from_polygons(polygons), 0.1, walls)
     poses = np.column_stack([rng.uniform(-1, 21, (200, 2)), rng.uniform(-4, 4, 200)])
     for pose in poses:
         checker.is_free(pose)
-    cells, scale = checker.open_floor
-    assert cells
-    for i, j in list(cells)[:8]:
-        places = (np.array([i, j]) + rng.uniform(0, 1, (3, 2))) / scale
-        for x, y in places:
-            pose = np.array([x, y, rng.uniform(-4, 4)])
-            assert naive_distance(BOX, polygons, pose) > 0.1
+    floor = checker.open_floor
+    assert floor.longest
+    for column, ends in floor.ends.items():
+        assert (np.diff(ends) > 0).all()
+        runs = np.reshape(ends, (-1, 2))
+        low, high = floor.longest[column]
+        assert high - low == (runs[:, 1] - runs[:, 0]).max()
+        assert [low, high] in runs.tolist()
+    for column in list(floor.ends)[:8]:
+        for low, high in np.reshape(floor.ends[column], (-1, 2)):
+            # The column of these x, by the very sum that finds it; not their border.
+            x = column - floor.shift + rng.uniform(-0.499, 0.499) * floor.cell
+            assert x + floor.shift == column
+            low, high = max(low, -3.0), min(high, 23.0)
+            for y in (low, high, *rng.uniform(low, high, 2)):
+                pose = np.array([x, y, rng.uniform(-4, 4)])
+                assert naive_distance(BOX, polygons, pose) > 0.1
+                if bounded:
+                    corners = naive_collision.placed(BOX, pose)
+                    assert np.abs(corners - 10.0).max() < 10.4
 
 
 @pytest.mark.parametrize("footprint", [BOX, L_SHAPE], ids=["box", "l-shape"])

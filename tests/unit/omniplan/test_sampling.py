@@ -213,6 +213,39 @@ def test_states_and_motions_agree_with_the_collision_checker(
     assert 0 < sum(answers) < len(answers)
 
 
+def test_bounds_count_as_they_are_when_asked(
+    spaces: dict[str, PermissibleSpace],
+) -> None:
+    """What is known of the floor outlives the bounds of the state space."""
+    si = _information()
+    far = Obstacles.from_polygons([[(9, 9), (9.5, 9), (9, 9.5)]])
+    sampling.equip(si, spaces["mecanum"], CollisionChecker(spaces["mecanum"], far))
+    state = _state(si, -5, -5, 0)
+    assert si.isValid(state)
+    assert si.isValid(state)
+    si.getStateSpace().setBounds(sampling.bounds_of((-4, -4, 4, 4)))
+    assert not si.isValid(state)
+    assert si.isValid(_state(si, 0, 0, 0))
+    state.setXY(0.0, 0.0)
+    state.setYaw(4.0)
+    assert not si.isValid(state)
+
+
+@pytest.mark.parametrize("place", [(math.nan, 0), (0, math.nan), (math.nan, math.nan)])
+def test_a_place_that_is_no_number_is_never_open_floor(
+    spaces: dict[str, PermissibleSpace], place: tuple[float, float]
+) -> None:
+    si = _information()
+    checker = CollisionChecker(spaces["mecanum"])
+    sampling.equip(si, spaces["mecanum"], checker)
+    state = _state(si, 0, 0, 0)
+    assert si.isValid(state)
+    assert checker.open_floor.longest
+    state.setXY(*place)
+    with pytest.raises(InvalidInput, match="finite numbers"):
+        si.isValid(state)
+
+
 def test_without_a_checker_the_programs_own_states_are_asked(
     spaces: dict[str, PermissibleSpace],
 ) -> None:
@@ -540,3 +573,51 @@ def test_every_public_name_is_there() -> None:
     assert set(sampling.__all__) <= set(dir(sampling))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = sampling.nothing
+
+
+MAKERS = (sampling.validity_checker, sampling.motion_validator, sampling.equip)
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_what_is_no_space_information_is_refused(
+    spaces: dict[str, PermissibleSpace], make: Any
+) -> None:
+    setup = geometric.SimpleSetup(base.SE2StateSpace())
+    for given, name in ((None, "NoneType"), (setup, "SimpleSetup")):
+        words = rf"si: {name}; an ompl.base.SpaceInformation; a SimpleSetup has one"
+        with pytest.raises(InvalidInput, match=words):
+            make(given, spaces["mecanum"])
+    make(setup.getSpaceInformation(), spaces["mecanum"])
+
+
+@pytest.mark.parametrize("make", MAKERS)
+@pytest.mark.parametrize(
+    ("checker", "name"), [(5, "int"), (Obstacles(), "Obstacles"), ("hall", "str")]
+)
+def test_what_is_no_checker_is_refused(
+    spaces: dict[str, PermissibleSpace], make: Any, checker: object, name: str
+) -> None:
+    words = (
+        rf"checker: {name}; a CollisionChecker, or anything with "
+        "is_free, is_motion_free, distance"
+    )
+    with pytest.raises(InvalidInput, match=words):
+        make(_information(), spaces["mecanum"], checker)
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_a_checker_of_another_vehicle_is_refused(
+    spaces: dict[str, PermissibleSpace], make: Any
+) -> None:
+    words = (
+        "checker: checks vehicle ackermann, whose footprint or reference point "
+        "differs; a CollisionChecker of vehicle mecanum"
+    )
+    with pytest.raises(InvalidInput, match=words):
+        make(_information(), spaces["mecanum"], CollisionChecker(spaces["ackermann"]))
+    for same in (
+        CollisionChecker(spaces["mecanum"]),
+        CollisionChecker(configspace.load_vehicle("mecanum"), clearance=0.1),
+        CollisionChecker([(1, 1), (-1, 1), (0, -1)]),
+    ):
+        make(_information(), spaces["mecanum"], same)

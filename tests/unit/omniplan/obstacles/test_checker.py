@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ import pytest
 import shapely  # noqa: TID251
 
 from configspace import InvalidInput, Vehicle, build_space, load_vehicle
-from omniplan import InvalidTrajectory, Path, Trajectory
+from omniplan import InvalidTrajectory, Path, Trajectory, plan
 from omniplan.obstacles import CollisionChecker, Obstacles
 from omniplan.planning.moves import Move
 
@@ -303,8 +304,96 @@ def test_motions_without_places_are_refused() -> None:
         checker.first_hit_of_trajectory(path)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("pose", [(2e6, 0, 0), (0, -1e300, 0)])
+def test_poses_beyond_the_walls_are_refused(pose: tuple[float, float, float]) -> None:
+    """The walls of the bounds are thick, not endless: nothing is free behind them."""
+    checker = CollisionChecker(SQUARE, wall(), bounds=(-9, -9, 9, 9))
+    assert not checker.is_free((1e6, -1e6, 0))
+    away = Move.straight((0, 0, 0), pose)
+    words = r"pose: \(.*\); finite numbers \(x, y, θ\), x and y of at most 1e\+06 m"
+    for ask in (checker.is_free, checker.distance, checker.hit_at):
+        with pytest.raises(InvalidInput, match=words):
+            ask(pose)
+    with pytest.raises(InvalidInput, match=words):
+        checker.are_free([(0, 0, 0), pose])
+    for ask_of in (checker.is_motion_free, checker.first_hit):
+        with pytest.raises(InvalidInput, match=words):
+            ask_of(away)
+    for ends in ((0, 0, *pose[:2]), (*pose[:2], 0, 0)):
+        with pytest.raises(InvalidInput, match=words):
+            checker.is_line_clear(*ends)
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_line_to_nowhere_is_told(bad: float) -> None:
     checker = CollisionChecker(load_vehicle("mecanum"), wall())
     with pytest.raises(InvalidInput, match=r"pose: .*; finite numbers"):
         checker.is_line_clear(0.0, 0.0, bad, 1.0)
+
+
+def test_bodies_are_told_apart_by_footprint_and_reference_point() -> None:
+    vehicle = load_vehicle("mecanum")
+    space = build_space(vehicle)
+    data = vehicle.model_dump()
+    assert vehicle.footprint is not None
+    begun_elsewhere = [*vehicle.footprint[1:], vehicle.footprint[0]]
+    changes: list[dict[str, object]] = [
+        {"name": "renamed"},
+        {"footprint": tuple(begun_elsewhere)},
+        {"footprint": tuple(begun_elsewhere[::-1])},
+    ]
+    for change in changes:
+        same = Vehicle.model_validate({**data, **change})
+        CollisionChecker(same).require_body_of(space)
+    longer = tuple((2 * x, y) for x, y in vehicle.footprint)
+    changes = [{"footprint": longer}, {"reference_point": (0.1, 0.0)}]
+    for change in changes:
+        other = Vehicle.model_validate({**data, **change})
+        with pytest.raises(InvalidInput, match="checks vehicle mecanum, whose foot"):
+            CollisionChecker(other).require_body_of(space)
+    bare = build_space(Vehicle.model_validate({**data, "footprint": ()}))
+    CollisionChecker(vehicle).require_body_of(bare)
+    renamed = Vehicle.model_validate({**data, "name": "renamed"})
+    with pytest.raises(InvalidInput, match=r"checks vehicle renamed.* vehicle mecanum"):
+        CollisionChecker(renamed).require_body_of(bare)
+    with pytest.raises(InvalidInput, match="checks vehicle ackermann, whose foot"):
+        plan((0, 0, 0), (1, 0, 0), space, CollisionChecker(load_vehicle("ackermann")))
+
+
+@pytest.mark.parametrize(
+    "pose", [(0, 0), (0, 0, 0, 0), "abc", None, (0, 0, "a"), [[0, 0, 0]], 3.0]
+)
+def test_what_is_no_pose_is_told(pose: Any) -> None:
+    checker = CollisionChecker(SQUARE, wall())
+    words = r"pose: .*; finite numbers \(x, y, θ\)"
+    for ask in (checker.is_free, checker.distance, checker.hit_at):
+        with pytest.raises(InvalidInput, match=words):
+            ask(pose)
+
+
+@pytest.mark.parametrize("poses", [(0, 0, 0), [[0, 0]] * 3, [[0, 0, "a"]], None, 3.0])
+def test_what_are_no_poses_is_told(poses: Any) -> None:
+    checker = CollisionChecker(SQUARE, wall())
+    with pytest.raises(InvalidInput, match="pose"):
+        checker.are_free(poses)
+    assert checker.are_free([]).shape == (0,)
+
+
+@pytest.mark.parametrize("motion", [None, 5, [(0, 0, 0), (1, 0, 0)]])
+def test_what_is_no_motion_is_told(motion: Any) -> None:
+    checker = CollisionChecker(SQUARE, wall())
+    for ask in (checker.is_motion_free, checker.first_hit, checker.swept):
+        with pytest.raises(InvalidInput, match=r"motion: \w+; a Move, or anything"):
+            ask(motion)
+
+
+@pytest.mark.parametrize("given", [[SQUARE], "hall.json", {"wall": WALL}])
+def test_what_are_no_obstacles_is_told(given: Any) -> None:
+    with pytest.raises(InvalidInput, match=r"obstacles: \w+; Obstacles, such as"):
+        CollisionChecker(SQUARE, given)
+
+
+@pytest.mark.parametrize("given", ["far", None, [1.0]])
+def test_what_is_no_clearance_is_told(given: Any) -> None:
+    with pytest.raises(InvalidInput, match=r"clearance: .*; a finite distance"):
+        CollisionChecker(SQUARE, None, given)

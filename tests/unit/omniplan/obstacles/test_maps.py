@@ -212,3 +212,73 @@ def test_pictures_that_cannot_be_used(
     monkeypatch.setattr("omniplan.obstacles.maps.MAX_RECTANGLES", 10)
     with pytest.raises(InvalidInput, match="rectangles of occupied cells; at most 10"):
         Obstacles.from_map(path)
+
+
+@pytest.mark.parametrize("negate", [0, 1])
+@pytest.mark.parametrize("kind", ["L", "RGB", "I;16"])
+def test_maps_are_read_as_map_servers_do(
+    tmp_path: Path, negate: int, kind: str
+) -> None:
+    """Pixel by pixel, as ROS' `map_server` and `nav2_map_server` fill their message.
+
+    The row at the bottom comes first; the mean of the colours is the shade.
+    """
+    rng = np.random.default_rng(negate)
+    high = 65536 if kind == "I;16" else 256
+    shape = (9, 14, 3) if kind == "RGB" else (9, 14)
+    picture = rng.integers(0, high, shape).astype(np.uint16 if high > 256 else np.uint8)
+    path = written(tmp_path, picture, negate=negate, resolution=0.5)
+    height, width = picture.shape[:2]
+    message = np.empty(height * width, dtype=int)
+    for row in range(height):
+        for column in range(width):
+            shade = float(np.mean(picture[row, column])) / (high - 1)
+            occupied = shade if negate else 1.0 - shade
+            value = 100 if occupied > 0.65 else 0 if occupied < 0.196 else -1
+            message[(height - 1 - row) * width + column] = value
+    assert {-1, 0, 100} == set(message.tolist())
+    careful, bold = (
+        CollisionChecker(DOT, Obstacles.from_map(path, unknown_is_free=is_bold))
+        for is_bold in (False, True)
+    )
+    for index, value in enumerate(message.tolist()):
+        pose = (0.5 * (index % width + 0.5), 0.5 * (index // width + 0.5), 0.0)
+        assert careful.is_free(pose) == (value == 0)
+        assert bold.is_free(pose) == (value != 100)
+
+
+@pytest.mark.parametrize(
+    ("mode", "name"), [("I", "map.tif"), ("F", "map.tif"), ("CMYK", "map.tif")]
+)
+def test_pixels_without_a_white_are_refused(
+    tmp_path: Path, mode: str, name: str
+) -> None:
+    """Of 32 bits the upper ones would be lost: 65536 is not black."""
+    path = written(tmp_path, painted(0))
+    Image.new(mode, (5, 4)).save(tmp_path / "map.tif")
+    path.write_text(path.read_text().replace("map.png", name))
+    words = f"image: pixels of kind {mode}; 8 or 16 bits of grey, or colours"
+    with pytest.raises(InvalidInput, match=words):
+        Obstacles.from_map(path)
+
+
+def test_an_opaque_alpha_frees_no_cell(tmp_path: Path) -> None:
+    """Map servers take it for one more white channel."""
+    grey = painted(3)
+    opaque = np.dstack([grey, np.full_like(grey, 255)])
+    found = Obstacles.from_map(written(tmp_path, opaque))
+    assert found.area == Obstacles.from_map(written(tmp_path, grey)).area
+    with pytest.raises(InvalidInput, match="alpha, with negate"):
+        Obstacles.from_map(written(tmp_path, opaque, negate=1))
+
+
+@pytest.mark.parametrize(
+    "changes", [{"origin": [999_999, 0, 0], "resolution": 1.0}, {"resolution": 1000.0}]
+)
+def test_maps_beyond_all_poses_are_refused(
+    tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    grey = painted(0, (1000, 300))
+    words = r"resolution: 300 × 1000 cells of .*; a map within 1e\+06 m of the axes"
+    with pytest.raises(InvalidInput, match=words):
+        Obstacles.from_map(written(tmp_path, grey, **changes))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -174,4 +175,124 @@ def test_heights_must_be_in_order(heights: tuple[float, float]) -> None:
 
 def test_what_is_no_mesh_is_told() -> None:
     with pytest.raises(InvalidInput, match=r"crate: 5; a trimesh\.Trimesh, or"):
-        Obstacles.from_meshes({"crate": 5}, (0.0, 1.0))  # type: ignore[dict-item]
+        Obstacles.from_meshes({"crate": 5}, (0.0, 1.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [creation.box((1, 1, 1)), 3, None])
+def test_one_mesh_alone_is_told(given: Any) -> None:
+    words = rf"meshes: {type(given).__name__}; a list of meshes, or a mapping"
+    with pytest.raises(InvalidInput, match=words):
+        Obstacles.from_meshes(given, (0, 1))
+
+
+def turned(body: trimesh.Trimesh) -> trimesh.Trimesh:
+    other = body.copy()
+    other.invert()
+    return other
+
+
+def test_what_stands_in_a_cavity_stays() -> None:
+    house, room = creation.box((10, 10, 10)), creation.box((9, 9, 9))
+    machine, drawer = creation.box((1, 1, 1)), creation.box((0.5, 0.5, 0.5))
+    inside = [house, turned(room), machine]
+    for bodies, area in (
+        (inside, 100 - 81 + 1),
+        ([*inside, turned(drawer)], 100 - 81 + 1 - 0.25),
+        ([turned(drawer), *inside[::-1]], 100 - 81 + 1 - 0.25),
+    ):
+        found = Obstacles.from_meshes([joined(bodies)], (0.0, 0.2))
+        assert found.area == pytest.approx(area)
+
+
+def test_a_cavity_across_two_solids_is_filled_up() -> None:
+    left, right = creation.box((2, 2, 2)), creation.box((2, 2, 2))
+    right.apply_translation((1.5, 0, 0))
+    hole = turned(creation.box((1.2, 1, 1)))
+    hole.apply_translation((0.75, 0, 0))
+    found = Obstacles.from_meshes([joined([left, right, hole])], (0.0, 0.2))
+    assert found.area == pytest.approx(2 * 3.5)
+
+
+def test_bodies_turned_inside_out_do_not_vanish() -> None:
+    box, small = creation.box((2, 1, 3)), creation.box((1, 0.5, 1))
+    away = turned(small)
+    away.apply_translation((5, 0, 0))
+    shell = joined([box, turned(small)])
+    floating = turned(creation.box((0.2, 0.2, 0.2)))
+    words = r"crate: faces turned inwards, one at \(.*\), in no solid; a closed solid"
+    for mesh in (
+        turned(box),
+        joined([box, away]),
+        turned(shell),
+        joined([shell, floating]),
+    ):
+        with pytest.raises(InvalidInput, match=words):
+            Obstacles.from_meshes({"crate": mesh}, (0.0, 0.2))
+
+
+def test_a_surface_that_overlaps_itself_is_solid_there() -> None:
+    """A closed bar that winds twice around, through itself at one place and more."""
+    t = np.linspace(0, 4 * np.pi, 200, endpoint=False)
+    reach = 2 + np.cos(t / 2)
+    middle = np.stack([reach * np.cos(t), reach * np.sin(t), 0 * t], axis=-1)
+    along = np.roll(middle, -1, axis=0) - np.roll(middle, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    across = np.stack([-along[:, 1], along[:, 0], 0 * t], axis=-1)
+    corner = np.array([[0.3, -0.5], [0.3, 0.5], [-0.3, 0.5], [-0.3, -0.5]])
+    vertices = (
+        middle[:, None]
+        + corner[None, :, :1] * across[:, None]
+        + corner[None, :, 1:] * np.array([0.0, 0.0, 1.0])
+    ).reshape(-1, 3)
+    i, j = (each.ravel() for each in np.indices((200, 4)))
+    a, b = 4 * i + j, 4 * i + (j + 1) % 4
+    c, d = 4 * ((i + 1) % 200) + j, 4 * ((i + 1) % 200) + (j + 1) % 4
+    faces = np.concatenate([np.stack([a, d, c], -1), np.stack([a, b, d], -1)])
+    bar = trimesh.Trimesh(vertices, faces, process=False)
+    assert bar.is_watertight
+    assert bar.volume > 0
+    area = shadow("bar", bar, (0.0, 0.2))
+    for place in middle:
+        assert area.covers(shapely.Point(place[:2]).buffer(0.28))
+    expected = shapely.LinearRing(middle[:, :2]).buffer(0.3)
+    assert area.symmetric_difference(expected).area < 0.02
+
+
+class Data:
+    """Vertices and faces of a tetrahedron, or what a file made of them."""
+
+    def __init__(self, **changes: Any) -> None:
+        self.vertices: Any = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        self.faces: Any = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+        self.__dict__.update(changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"vertices": [[0, 0], [1, 0]]}, r"vertices of shape \(2, 2\), int64; numbers"),
+        ({"vertices": [["a", "b", "c"]]}, "vertices of shape"),
+        ({"faces": "abc"}, r"faces of shape \(\), <U3; triangles"),
+        ({"faces": [[0, 2, 1, 3]]}, r"faces of shape \(1, 4\), int64; triangles"),
+        ({"faces": [[0.5, 2, 1]]}, r"faces of shape \(1, 3\), float64; triangles"),
+        ({"faces": [[0, 1, 9]]}, r"face 0 of vertices \[0, 1, 9\]; .* from 0 to 3"),
+        ({"faces": [[0, 2, 1], [0, 1, -1]]}, r"face 1 of vertices \[0, 1, -1\]"),
+        ({"faces": []}, "a mesh without faces"),
+        (
+            {"vertices": [[0, 0, np.nan], *[[1, 0, 0]] * 3]},
+            r"vertex 0 at \(0.0, 0.0, n",
+        ),
+    ],
+)
+def test_arrays_that_are_no_triangles_are_told(
+    changes: dict[str, Any], words: str
+) -> None:
+    assert shadow("wedge", Data(), (0.0, 0.5)).area == pytest.approx(0.5)
+    with pytest.raises(InvalidInput, match=f"wedge: {words}"):
+        Obstacles.from_meshes({"wedge": Data(**changes)}, (0.0, 0.5))
+
+
+@pytest.mark.parametrize("heights", [None, (1,), ("a", "b"), (0, 1, 2), 1.0])
+def test_what_are_no_heights_is_told(heights: Any) -> None:
+    with pytest.raises(InvalidInput, match=r"heights: .*; two finite heights"):
+        Obstacles.from_meshes([creation.box()], heights)

@@ -93,6 +93,9 @@ def test_holes_stay_free() -> None:
         ([[0, 0, 0], [1, 0, 0], [1, 1, 0]], r"shape \(3, 3\)"),
         ([[0, 0], [1], [1, 1]], "corners"),
         ("a wall", "'a wall'"),
+        ([["0", "0"], ["1", "0"], ["0", "1"]], r"corners \(n, 2\) in m"),
+        ([[False, False], [True, False], [True, True]], r"corners \(n, 2\) in m"),
+        (None, r"None; corners \(n, 2\) in m"),
         (Polygon(), "an empty polygon"),
         (Polygon([[0, 0], [4, 4], [4, 0], [0, 4]]), r"at \(2, 2\)"),
     ],
@@ -130,6 +133,10 @@ def test_files_hold_lists_or_names(tmp_path: Path) -> None:
     [
         ("{", "readable JSON"),
         ("3", "a list of polygons, or a mapping"),
+        (
+            '{"a": [[0, 0], [1, 0], [0, 1]], "a": [[5, 5], [6, 5], [5, 6]]}',
+            "the key 'a' stands twice",
+        ),
         ('{"a": {"outside": []}}', "a: keys .'outside'.; exterior"),
         ("[[[0, 0], [2, 2], [2, 0], [0, 2]]]", "obstacle 0: self-intersection"),
         ('{"a": {"exterior": [[0,0],[1,0],[0,1]], "holes": [3]}}', r"a: holes\[0\]"),
@@ -151,3 +158,11 @@ def test_wrong_files_are_told(tmp_path: Path, text: str, words: str) -> None:
 def test_what_is_no_collection_of_polygons_is_told(given: object) -> None:
     with pytest.raises(InvalidInput, match="a list of polygons, or a mapping"):
         Obstacles.from_polygons(given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [None, 5, [TRIANGLE]])
+def test_what_is_no_path_is_told(given: object) -> None:
+    with pytest.raises(InvalidInput, match=r"obstacle file: \w+; the path of a file"):
+        Obstacles.from_json(given)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match=r"map: \w+; the path of a file"):
+        Obstacles.from_map(given)  # type: ignore[arg-type]
