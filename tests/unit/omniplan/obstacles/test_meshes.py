@@ -296,3 +296,38 @@ def test_arrays_that_are_no_triangles_are_told(
 def test_what_are_no_heights_is_told(heights: Any) -> None:
     with pytest.raises(InvalidInput, match=r"heights: .*; two finite heights"):
         Obstacles.from_meshes([creation.box()], heights)
+
+
+def stone(rng: np.random.Generator, size: float) -> trimesh.Trimesh:
+    mesh = creation.icosphere(subdivisions=1)
+    mesh.vertices = (
+        mesh.vertices * rng.uniform(0.7, 1.0, (len(mesh.vertices), 1)) * size
+    )
+    return mesh
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nested_and_overlapping_stones_against_columns(seed: int) -> None:
+    """A shell with a stone in it, and another through its side, in any order."""
+    rng = np.random.default_rng(seed)
+    shell, room, kernel, other = (stone(rng, size) for size in (2.0, 1.2, 0.5, 0.9))
+    kernel.apply_translation(rng.uniform(-0.2, 0.2, 3))
+    other.apply_translation([1.5, 0.0, 0.0])
+    low, high = np.sort(rng.uniform(-1.0, 1.0, 2))
+    bodies = [shell, turned(room), kernel, other]
+    mesh = joined([bodies[i] for i in rng.permutation(4)])
+    area = shadow("stones", mesh, (low, high))
+    z = np.linspace(low, high, 400)
+
+    def is_solid(x: float, y: float) -> bool:
+        column = np.column_stack([np.full(400, x), np.full(400, y), z])
+        around = [_winding(body, column) > 0.5 for body in (shell, room, kernel, other)]
+        return bool(((around[0] & ~around[1]) | around[2] | around[3]).any())
+
+    solid = 0
+    for x, y in rng.uniform([-2, -2], [2.4, 2], (60, 2)):
+        if area.boundary.distance(shapely.Point(x, y)) < 0.02:
+            continue
+        assert shapely.intersects_xy(area, x, y) == is_solid(x, y)
+        solid += is_solid(x, y)
+    assert solid
