@@ -138,10 +138,11 @@ def is_free(task: Task, poses: FloatArray) -> bool:
     task : Task
     poses : (n, 3) float, m, m, rad
     """
-    checker = task.checker
-    return checker is None or all(
-        checker.is_motion_free(Move.arc(a, b)) for a, b in itertools.pairwise(poses)
-    )
+    for a, b in itertools.pairwise(poses):
+        task.budget.check()
+        if task.checker is not None and not task.checker.is_motion_free(Move.arc(a, b)):
+            return False
+    return True
 
 
 def _parts(route: Route) -> list[FloatArray]:
@@ -166,6 +167,7 @@ class _Corners:
 
     def piece(self, poses: FloatArray) -> _Piece | None:
         """Return a piece with its times; None if it cannot be driven in one go."""
+        self._task.budget.check()
         space, reference = self._task.space, self._task.vehicle.reference
         point = reference.real, reference.imag
         path = Route(poses, ()).to_path("piece", point)
@@ -207,6 +209,7 @@ class _Corners:
         """Return one piece in place of two, if it takes less than a time."""
         size = min(before.u[-1], after.u[-1])
         for share in SHARES:
+            self._task.budget.check()
             length = min(share * float(size), LONGEST)
             if length < SHORTEST:
                 return None

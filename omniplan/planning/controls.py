@@ -158,7 +158,9 @@ class _Tree:
         if task.budget.is_over or len(self.ways) >= ENOUGH:
             return True
         first = self._first_after
-        return first is not None and task.budget.asked > PATIENCE * first
+        if first is None:
+            return task.is_known_enclosed()
+        return task.budget.asked > PATIENCE * first
 
     def begin(self) -> list[State]:
         """Return the states to start from: the pose with several configurations."""
@@ -174,6 +176,7 @@ class _Tree:
 
     def drive(self, state: State, batch: float, pick: float) -> State | None:
         """Drive a batch of controls; return the end of the one that is picked."""
+        self.task.budget.check()
         first = int(batch * (POOL - BATCH))
         controls = self._pool[first : first + BATCH].copy()
         known = self._segments.get(state)

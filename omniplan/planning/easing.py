@@ -238,6 +238,7 @@ def eased_off(
     found = []
     for shortest in SHORTEST:
         for way in eased(moves, line, largest, shortest):
+            task.budget.check()
             if task.budget.is_late:
                 break
             route = way.to_route(largest)

@@ -9,6 +9,7 @@ grid leaves open may be closed all the same, so the answer is "proved" or "not k
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ CELL = 0.5
 LARGEST_CELL = 1.0
 """... but up to this where there would be too many: larger ones prove nothing."""
 MOST_CELLS = 60_000
+AT_ONCE = 2_000
+"""So many cells are looked at between two calls of a checkpoint."""
 SLACK = 2e-3
 """The disc is smaller by this, m: the checker of a search keeps more distance than was
 asked for (`request.SPARE`), which must not count."""
@@ -36,13 +39,20 @@ POINT = 1e-6
 """Size of the footprint that stands for the middle of a cell, m."""
 
 
-def is_enclosed(checker: CollisionChecker, start: Pose, goal: Pose) -> bool:
+def is_enclosed(
+    checker: CollisionChecker,
+    start: Pose,
+    goal: Pose,
+    checkpoint: Callable[[], None] | None = None,
+) -> bool:
     """Return whether it is proved that no way leads from start to goal.
 
     Parameters
     ----------
     checker : CollisionChecker
     start, goal : (float, float, float), m, m, rad
+    checkpoint : callable, optional
+        Called every few milliseconds; what it raises ends the work.
     """
     from omniplan.obstacles import CollisionChecker
 
@@ -64,7 +74,12 @@ def is_enclosed(checker: CollisionChecker, start: Pose, goal: Pose) -> bool:
     triangle = POINT * np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]])
     point = CollisionChecker(triangle, checker.obstacles, reach, checker.bounds)
     poses = np.concatenate([middles, np.zeros((len(middles), 1))], axis=1)
-    open_ = point.are_free(poses).reshape(count)
+    parts = []
+    for some in np.array_split(poses, math.ceil(len(poses) / AT_ONCE)):
+        if checkpoint is not None:
+            checkpoint()
+        parts.append(point.are_free(some))
+    open_ = np.concatenate(parts).reshape(count)
     ends = [
         tuple(((np.array(pose[:2]) - low) / side).astype(np.int64).tolist())
         for pose in (start, goal)

@@ -70,7 +70,9 @@ def finished(
     """
     space, reference = task.space, task.vehicle.reference
     path = route.to_path("plan", (reference.real, reference.imag))
-    timing = time_path(path, space)
+    checkpoint = task.budget.checkpoint
+    task.budget.check()
+    timing = time_path(path, space, checkpoint=checkpoint)
     if timing.trajectory is None:
         place = None if timing.fault is None else timing.fault.pose
         return _refused(task, timing.message, place, None, statistics)
@@ -79,11 +81,14 @@ def finished(
         message = "at an end the wheels find no way from or to the configuration given"
         return _refused(task, message, task.start, None, statistics)
     # `time_path` has validated it; this is for the report, and after waits were added.
-    report = judged(trajectory, space, Tolerances(), allow_unreachable=False)
+    report = judged(
+        trajectory, space, Tolerances(), allow_unreachable=False, checkpoint=checkpoint
+    )
     if not report.valid:
         worst = report.headline
         place = None if worst is None else worst.pose
         return _refused(task, str(worst), place, report, statistics)
+    task.budget.check()
     hit = None if strict is None else strict.first_hit_of_trajectory(trajectory)
     if hit is not None:
         return _refused(

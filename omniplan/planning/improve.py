@@ -54,6 +54,7 @@ def shortened(
     chain, total, stale = found.chain, found.duration, 0
     while stale < STALE and len(chain) > 1 and not task.budget.is_over:
         stale += 1
+        task.budget.check()
         change = _cut if random.random() < CUTS else _shift
         for _, whole, new in itertools.islice(
             sorted(change(connector, chain, random, total - GAIN), key=_first), TRIED

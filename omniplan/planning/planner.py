@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Literal
 
@@ -25,7 +25,7 @@ from omniplan.planning.improve import GAIN, moves_of, shortened
 from omniplan.planning.request import Request, checked_request, refusal
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.route import Route
-from omniplan.planning.search import OPTIMISING, Found, direct, search
+from omniplan.planning.search import FIRST, OPTIMISING, Found, direct, search
 from omniplan.planning.start_up import make_ready
 from omniplan.planning.task import Task
 from omniplan.trajectory import Trajectory
@@ -39,6 +39,10 @@ RESTARTS = 3
 """So many searches in a row that find nothing quicker are enough."""
 PATIENCE = 2
 """A search for a quicker way ends after so many times the motions asked before."""
+FIRST_TRY = 400
+"""A search that finds no way starts anew after so many motions, as how long it takes
+varies much from seed to seed; then one that grows its trees in short steps gets half as
+many. With each such pair both numbers are doubled."""
 MOST_FINISHED = 3
 """Of so many ways the corners are rounded, and all are timed and proved, those that are
 hoped to be the quickest first, until one is accepted."""
@@ -62,6 +66,7 @@ def plan(
     iterations: int | None = None,
     method: Literal["geometric", "control"] = "geometric",
     heading: Literal["free", "keep"] = "free",
+    checkpoint: Callable[[], None] | None = None,
 ) -> Plan:
     """Return the quickest trajectory found from pose to pose, or why there is none.
 
@@ -102,6 +107,9 @@ def plan(
     heading : {"free", "keep"}
         With ``keep`` the vehicle only translates, in any direction it can: its load
         keeps its heading all along. Whether it can at all, the status says.
+    checkpoint : callable, optional
+        Called every few milliseconds, from the search to the proof; what it raises
+        ends the work and reaches the caller. So a plan can be given up.
 
     Returns
     -------
@@ -141,6 +149,7 @@ def plan(
         iterations=iterations,
         method=method,
         heading=heading,
+        checkpoint=checkpoint,
     )
     no = refusal(request)
     if no is not None:
@@ -195,17 +204,34 @@ def _ways(task: Task, connector: Connector) -> tuple[list[Found], int]:
         _improve(task, connector, ways, first, random)
     while not _is_enough(task, ways) and stale < RESTARTS:
         searches += 1
-        most = None if not ways else PATIENCE * task.budget.asked
         best = _quickest(ways)
-        found = search(task, connector, task.seed + searches, most)
+        found, is_cut_short = _searched(task, connector, searches)
         if found is not None:
             ways.append(found)
             task.budget.has_way = True
             _improve(task, connector, ways, found, random)
-        stale = 0 if _quickest(ways) < best - GAIN else stale + 1
+        is_better = _quickest(ways) < best - GAIN
+        stale = 0 if is_better or is_cut_short else stale + 1
         if task.planner in OPTIMISING and found is not None:
             break
     return sorted(ways, key=lambda way: way.duration), searches
+
+
+def _searched(
+    task: Task, connector: Connector, number: int
+) -> tuple[Found | None, bool]:
+    """Return what the search of a number found, and whether it is to start anew."""
+    budget, most = task.budget, None
+    pair, is_short = divmod(number - 1, 2)
+    if budget.has_way:
+        most = PATIENCE * budget.asked
+    elif task.planner in FIRST:
+        most = FIRST_TRY * 2**pair // (1 + is_short)
+    last = math.inf if budget.has_way or most is None else budget.asked + most
+    in_short_steps = bool(is_short) and not budget.has_way
+    seed = task.seed + number
+    found = search(task, connector, seed, most, in_short_steps=in_short_steps)
+    return found, found is None and budget.asked >= last
 
 
 def _improve(

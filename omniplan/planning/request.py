@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -72,13 +73,14 @@ def checked_request(
     iterations: int | None,
     method: str,
     heading: str,
+    checkpoint: Callable[[], None] | None,
 ) -> Request:
     """Return a request, or raise InvalidInput saying what makes no sense.
 
     Parameters
     ----------
     start, goal, space, obstacles, bounds, clearance, planner, time, seed, iterations, \
-method, heading
+method, heading, checkpoint
         As of `omniplan.plan`.
     """
     vehicle = _vehicle(space)
@@ -106,7 +108,7 @@ method, heading
         hall.area_of(strict, connector, (a, b)),
         planner,
         number,
-        Budget(seconds, motions),
+        Budget(seconds, motions, checkpoint=checkpoint),
     )
     return Request(task, Ends(from_, to), strict, connector, method)
 
@@ -217,8 +219,11 @@ def _not_permitted(task: Task, at: Configuration) -> str:
         return ""
     reason, wheel = space.explain(*at)
     names = [flag.name or "" for flag in Reason(int(reason))]
-    who = f" of wheel {task.vehicle.wheels[int(wheel)].id}" if int(wheel) >= 0 else ""
-    what = " and ".join(names) or "a limit"
+    what, who = " and ".join(names) or "a limit", ""
+    if int(wheel) >= 0:
+        # Several limits may be of several wheels: the first one is told.
+        of = ", first" if len(names) > 1 else ""
+        who = f"{of} of wheel {task.vehicle.wheels[int(wheel)].id}"
     where = f"κ_n = {at[0]:g}, β = {_degrees(at[1])}"
     return f"{where}, is forbidden by {what}{who}"
 

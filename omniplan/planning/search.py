@@ -15,7 +15,7 @@ from typing import Any
 from omniplan.planning.connect import Chain, Connector, chain_time, joined
 from omniplan.planning.task import Pose, Task
 
-__all__ = ["OPTIMISING", "PLANNERS", "Found", "direct", "search"]
+__all__ = ["FIRST", "OPTIMISING", "PLANNERS", "Found", "direct", "search"]
 
 FIRST = ("RRTConnect", "RRT", "KPIECE1", "BKPIECE1", "LBKPIECE1")
 OPTIMISING = ("RRTstar", "InformedRRTstar", "BITstar", "FMT")
@@ -23,6 +23,8 @@ OPTIMISING = ("RRTstar", "InformedRRTstar", "BITstar", "FMT")
 PLANNERS = (*FIRST, *OPTIMISING)
 CLOSED = 1e6
 """Estimated time of a motion that is not permitted, s."""
+SHORTER = 0.25
+"""Short steps of a planner's trees, as a share of OMPL's."""
 DIRECT = 4
 """So many ways without a search are checked for collisions."""
 
@@ -55,7 +57,12 @@ def direct(task: Task, connector: Connector) -> Found | None:
 
 
 def search(
-    task: Task, connector: Connector, seed: int, most: int | None = None
+    task: Task,
+    connector: Connector,
+    seed: int,
+    most: int | None = None,
+    *,
+    in_short_steps: bool = False,
 ) -> Found | None:
     """Return a way found by OMPL, or None.
 
@@ -66,10 +73,12 @@ def search(
     seed : int, ≥ 1
     most : int, optional
         So many motions are checked at most.
+    in_short_steps : bool
+        Whether trees grow in shorter steps than usual, of planners with restarts.
     """
     from omniplan.sampling import ompl_bindings as ompl
 
-    run = _Run(task, connector, ompl)
+    run = _Run(task, connector, ompl, in_short_steps)
     ompl.seeded(seed)
     with ompl.quiet():
         poses = run.solve(math.inf if most is None else task.budget.asked + most)
@@ -86,8 +95,11 @@ def search(
 class _Run:
     """One run of one planner."""
 
-    def __init__(self, task: Task, connector: Connector, ompl: Any) -> None:
+    def __init__(
+        self, task: Task, connector: Connector, ompl: Any, in_short_steps: bool
+    ) -> None:
         self._task, self._connector, self._ompl = task, connector, ompl
+        self._in_short_steps = in_short_steps
         self._known: dict[tuple[Pose, Pose], Chain | None] = {}
         self.first_at: float | None = None
 
@@ -125,8 +137,11 @@ class _Run:
         planner = getattr(self._ompl.geometric, task.planner)(information)
         planner.setProblemDefinition(problem)
         planner.setup()
+        if self._in_short_steps and task.planner in FIRST:
+            planner.setRange(SHORTER * planner.getRange())
 
         def is_over() -> bool:
+            task.budget.check()
             if self.first_at is None and problem.hasExactSolution():
                 self.first_at = task.budget.elapsed
             if task.budget.is_over or task.budget.asked >= most:

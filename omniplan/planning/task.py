@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
@@ -66,11 +66,18 @@ class Budget:
     """Whether a way is known: then some time is kept for rounding its corners."""
     is_enclosed: bool | None = None
     """Whether it is proved that there is no way; None: not looked at yet."""
+    checkpoint: Callable[[], None] | None = None
+    """Called again and again; what it raises ends the work."""
     begun: float = field(default_factory=time.perf_counter)
 
     def start(self) -> None:
         """Let the clock start now."""
         self.begun = time.perf_counter()
+
+    def check(self) -> None:
+        """Call the checkpoint, if there is one."""
+        if self.checkpoint is not None:
+            self.checkpoint()
 
     @property
     def elapsed(self) -> float:
@@ -129,10 +136,11 @@ class Task:
 
         if not isinstance(self.checker, CollisionChecker):
             return False
-        return is_enclosed(self.checker, self.start, self.goal)
+        return is_enclosed(self.checker, self.start, self.goal, self.budget.checkpoint)
 
     def is_free(self, pose: Pose) -> bool:
         """Return whether the vehicle can stand in a pose."""
+        self.budget.check()
         return self.checker is None or self.checker.is_free(pose)
 
     def are_free(self, moves: Iterable[Move]) -> bool:
@@ -141,6 +149,7 @@ class Task:
             if self.budget.is_spent:
                 return False
             self.budget.asked += 1
+            self.budget.check()
             if self.checker is not None and not self.checker.is_motion_free(move):
                 return False
         return True

@@ -12,12 +12,14 @@ from configspace.vehicle import Castor, SteerableWheel
 from omniplan.plots.data import drive_of
 from omniplan.trajectory import Trajectory
 
-__all__ = ["Film", "film_of", "spread_along", "wheels_at"]
+__all__ = ["Film", "film_of", "nose_at", "outline_at", "spread_along", "wheels_at"]
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 IntArray = npt.NDArray[np.int64]
 
+NOSE = 0.15
+"""Length and width of the triangle that points ahead, as a share of the vehicle's."""
 WHEEL = 0.2, 0.07
 """Length and width of a wheel in a picture, as shares of the vehicle's length."""
 
@@ -67,6 +69,44 @@ def film_of(
         _xy(turn * wheels + place).reshape(n, -1, 4, 2),
         _xy(k)[:, 0],
     )
+
+
+def outline_at(pose: tuple[float, float, float], space: PermissibleSpace) -> FloatArray:
+    """Return the footprint where K is in a pose, (m, 2) m.
+
+    Parameters
+    ----------
+    pose : (float, float, float), m, m, rad
+    space : PermissibleSpace
+        With footprint.
+    """
+    return _placed(np.asarray(space.header.footprint), pose, space)
+
+
+def nose_at(pose: tuple[float, float, float], space: PermissibleSpace) -> FloatArray:
+    """Return a triangle at the front of the vehicle that points ahead, (3, 2) m.
+
+    Parameters
+    ----------
+    pose : (float, float, float), m, m, rad
+        Of K.
+    space : PermissibleSpace
+        With footprint.
+    """
+    footprint = np.asarray(space.header.footprint)
+    (_, y0), (x1, y1) = footprint.min(axis=0), footprint.max(axis=0)
+    size, y = NOSE * float(np.ptp(footprint, axis=0).max()), (y0 + y1) / 2
+    back = x1 - size
+    triangle = np.array([[x1, y], [back, y + size / 2], [back, y - size / 2]])
+    return _placed(triangle, pose, space)
+
+
+def _placed(
+    points: FloatArray, pose: tuple[float, float, float], space: PermissibleSpace
+) -> FloatArray:
+    """Return points of the vehicle file's frame where K is in a pose."""
+    from_k = (points - np.asarray(space.header.reference)) @ [1, 1j]
+    return _xy(from_k * np.exp(1j * pose[2]) + complex(pose[0], pose[1]))
 
 
 def wheels_at(space: PermissibleSpace, alpha: FloatArray) -> ComplexArray:

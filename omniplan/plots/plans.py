@@ -18,7 +18,7 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from configspace.plot_style import new_figure
 from omniplan.motion import stops_of
-from omniplan.plots.plan_data import film_of, spread_along
+from omniplan.plots.plan_data import film_of, nose_at, outline_at, spread_along
 from omniplan.plots.style import BROKEN, GOAL, PATH, START, plain
 from omniplan.scenarios.solving import Solution
 
@@ -136,6 +136,7 @@ def numbers_of(solution: Solution) -> str:
 def _draw_way(axes: Axes, solution: Solution) -> None:
     trajectory, swept = solution.plan.trajectory, solution.swept
     if trajectory is None or swept is None:
+        _draw_failure(axes, solution)
         return
     axes.add_patch(PathPatch(_path(swept.rings), fc=SWEPT, ec="none", zorder=1))
     film = film_of(trajectory, solution.space)
@@ -155,9 +156,30 @@ def _draw_way(axes: Axes, solution: Solution) -> None:
         axes.add_collection(
             PolyCollection(list(film.wheels[index]), fc=colour, ec="none", zorder=4)
         )
+        turn = float(trajectory.samples[index, 2])
+        nose = nose_at((*film.k[index].tolist(), turn), solution.space)
+        axes.add_patch(Polygon(nose, fc=colour, ec="none", zorder=5))
     axes.plot(*film.k.T, color=PATH, lw=1.4, zorder=6)
     stands = _standstills(solution)
     axes.plot(*stands.T, "o", ms=5, color="white", mec=BROKEN, mew=1.5, zorder=7)
+
+
+def _draw_failure(axes: Axes, solution: Solution) -> None:
+    """Draw start and goal, and where the plan failed."""
+    looks = ((START, "-", 2.0), (GOAL, "-", 2.0))
+    shown = list(zip(solution.ends, looks, strict=False))
+    place = solution.plan.place
+    if place is not None:
+        shown.append((place, (BROKEN, "--", 1.4)))
+        axes.plot(*place[:2], "X", ms=9, color=BROKEN, mec="black", zorder=7)
+    for pose, (colour, style, width) in shown:
+        outline = outline_at(pose, solution.space)
+        axes.add_patch(
+            Polygon(outline, fc="none", ec=colour, lw=width, ls=style, zorder=5)
+        )
+        nose = nose_at(pose, solution.space)
+        axes.add_patch(Polygon(nose, fc=colour, ec="none", zorder=5))
+        axes.plot(*pose[:2], "+", ms=6, color=colour, mew=1.5, zorder=6)
 
 
 def _standstills(solution: Solution) -> FloatArray:
@@ -181,25 +203,52 @@ def _keys(solutions: Sequence[Solution]) -> list[Artist]:
         Line2D([], [], color=PATH, lw=1.4, label="path of K"),
     ]
     look = {"marker": "o", "ls": "none", "mfc": "white", "mec": BROKEN, "mew": 1.5}
+    if not any(solution.plan.is_found for solution in solutions):
+        keys = keys[:2]
+    if any(_fails_somewhere(solution) for solution in solutions):
+        cross = {"marker": "X", "ls": "none", "mfc": BROKEN, "mec": "black", "ms": 9}
+        keys.append(Line2D([], [], label="where it fails", **cross))  # type: ignore[arg-type]
     if any(solution.plan.stops for solution in solutions):
         keys.append(Line2D([], [], label="stop", **look))  # type: ignore[arg-type]
     return keys
 
 
+def _fails_somewhere(solution: Solution) -> bool:
+    return not solution.plan.is_found and solution.plan.place is not None
+
+
 def _common(solutions: Sequence[Solution]) -> Bounds:
     """Return a box around all that is shown."""
-    boxes = []
-    for solution in solutions:
-        if solution.obstacles.bounds is not None:
-            boxes.append(solution.obstacles.bounds)
-        if solution.swept is not None:
-            boxes.append(solution.swept.bounds)
+    boxes = [box for solution in solutions for box in _boxes(solution)]
     if not boxes:
         return (-1.0, -1.0, 1.0, 1.0)
     x0, y0, _, _ = np.min(boxes, axis=0).tolist()
     _, _, x1, y1 = np.max(boxes, axis=0).tolist()
     margin = 0.02 * max(x1 - x0, y1 - y0)
     return x0 - margin, y0 - margin, x1 + margin, y1 + margin
+
+
+def _boxes(solution: Solution) -> list[Bounds]:
+    """Return boxes around the way, or start and goal, and what stands around it."""
+    hall = solution.obstacles.bounds
+    around: list[Bounds] = []
+    if solution.swept is not None:
+        around.append(solution.swept.bounds)
+    else:
+        poses = (*solution.ends, solution.plan.place)
+        for pose in (pose for pose in poses if pose is not None):
+            outline = outline_at(pose, solution.space)
+            around.append((*outline.min(axis=0), *outline.max(axis=0)))
+    if not around or hall is None:
+        return around if hall is None else [hall]
+    x0, y0 = np.min(around, axis=0)[:2].tolist()
+    x1, y1 = np.max(around, axis=0)[2:].tolist()
+    room = max(x1 - x0, y1 - y0)  # what is farther away would make the way tiny
+    near = (
+        max(hall[0], x0 - room), max(hall[1], y0 - room),
+        min(hall[2], x1 + room), min(hall[3], y1 + room),
+    )  # fmt: skip
+    return [*around, near]
 
 
 def _path(rings: Sequence[FloatArray]) -> Path:

@@ -120,7 +120,6 @@ _PARKING = Scenario(
         "vehicle ahead": _box(_GAP / 2, -0.35, _GAP / 2 + 1.2, 0.35),
     },
     bounds=(-2.8, -0.75, 2.8, 2.2),
-    iterations=3000,
 )
 _CORNER = Scenario(
     name="corner",

@@ -30,6 +30,8 @@ class Solution:
     plan: Plan
     title: str = ""
     """What pictures and tables call the vehicle; default its name."""
+    ends: tuple[Pose, ...] = ()
+    """Poses of K at start and goal, for pictures of plans that were not found."""
 
     def __post_init__(self) -> None:
         """Give a title where there is none."""
@@ -81,9 +83,10 @@ def solve(
     """
     space = space_of_platform(vehicle)
     obstacles = Obstacles.from_polygons(task.obstacles)
+    start, goal = (pose_of_k(pose, space) for pose in (task.start, task.goal))
     found = plan(
-        pose_of_k(task.start, space),
-        pose_of_k(task.goal, space),
+        start,
+        goal,
         space,
         obstacles,
         bounds=task.bounds,
@@ -93,7 +96,7 @@ def solve(
         seed=task.seed if seed is None else seed,
         heading=task.heading,
     )
-    return Solution(space, obstacles, found, TITLES[vehicle])
+    return Solution(space, obstacles, found, TITLES[vehicle], (start, goal))
 
 
 def solve_all(

@@ -200,7 +200,7 @@ def _vehicle(options: argparse.Namespace) -> int:
             method=options.method or "geometric",
             heading=options.heading or "free",
         )
-    solution = Solution(space, obstacles, found)
+    solution = Solution(space, obstacles, found, ends=(start, goal))
     if options.json:
         answers.print_json(solution.to_dict())
     else:

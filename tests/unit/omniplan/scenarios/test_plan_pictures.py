@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.patches import Polygon  # noqa: TID251
 from PIL import Image
 
 from configspace import InvalidInput
@@ -102,6 +104,37 @@ def test_pictures_show_all_plans_and_those_that_failed(
     assert y0 < -0.75 < 0.85 < y1
     save_figure(figure, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").stat().st_size > 5000
+
+
+def test_a_plan_that_failed_shows_start_goal_and_where(sideways: Solution) -> None:
+    space = sideways.space
+    k = complex(*space.header.reference)
+    start, goal = (k.real, 0.0, 0.0), (8.0, 0.5, math.pi / 2)
+    status, message = PlanStatus.GOAL_BLOCKED, "goal blocked: at the goal it hits it"
+    no = Plan(space.name, status, message, place=goal)
+    wall = Obstacles.from_polygons([[(7, -90), (7.2, -90), (7.2, 90), (7, 90)]])
+    (axes,) = plot_plans([Solution(space, wall, no, ends=(start, goal))]).axes
+    outlines = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+    footprint = np.array(space.header.footprint)
+    drawn = [outline.get_xy()[:-1] for outline in outlines]
+    noses = [corners for corners in drawn if len(corners) == 3]
+    drawn = [corners for corners in drawn if len(corners) == 4]
+    turned = (footprint @ [1, 1j] - k) * 1j + complex(*goal[:2])
+    at_goal = np.stack([turned.real, turned.imag], axis=-1)
+    assert drawn[0] == pytest.approx(footprint)
+    assert drawn[1] == pytest.approx(at_goal)
+    assert drawn[2] == pytest.approx(at_goal)
+    # Ahead, in the middle of the front: to the right at the start, up at the goal.
+    assert noses[0][0] == pytest.approx((footprint[:, 0].max(), 0.0))
+    assert noses[1][0] == pytest.approx((goal[0], at_goal[:, 1].max()))
+    assert (noses[1][1:, 1] < noses[1][0, 1]).all()
+    crosses = [line for line in axes.lines if line.get_marker() == "X"]
+    assert [np.ravel(line.get_xydata()).tolist() for line in crosses] == [[8.0, 0.5]]
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    for corners in drawn:
+        assert (corners > [x0, y0]).all()
+        assert (corners < [x1, y1]).all()
+    assert y1 - y0 < 40  # the whole wall would hide where it failed
 
 
 def test_animations_are_small_and_as_long_as_the_plan(
