@@ -106,6 +106,9 @@ class _Actor:
             axes.add_patch(
                 Polygon(outline, fc="none", ec=colour, lw=1.2, ls="--", zorder=3)
             )
+            axes.add_patch(
+                Polygon(self._film.noses[index], fc=colour, ec="none", zorder=3)
+            )
 
     def show(self, t: float, before: float) -> None:
         """Show the vehicle at a time; what it has swept since `before` stays."""
@@ -121,9 +124,11 @@ class _Actor:
         del line  # the path stays
         body = Polygon(at.outlines[-1], fc="white", ec="black", lw=1.6, zorder=4)
         wheels = _filled(at.wheels[-1], "black", zorder=5)
+        nose = Polygon(at.noses[-1], fc="black", ec="none", zorder=5)
         self._axes.add_patch(body)
+        self._axes.add_patch(nose)
         self._axes.add_collection(wheels)
-        self._moving = [body, wheels]
+        self._moving = [body, nose, wheels]
         now = f"{min(t, self._duration):4.1f} s"
         is_there = t >= self._duration
         self._axes.set_xlabel(numbers_of(self._solution) if is_there else now)
@@ -137,7 +142,8 @@ def film_at(film: Film, t: FloatArray) -> Film:
         columns = [np.interp(t, film.t, column) for column in flat.T]
         return np.stack(columns, axis=-1).reshape(len(t), *values.shape[1:])
 
-    return Film(t, between(film.outlines), between(film.wheels), between(film.k))
+    shapes = film.outlines, film.wheels, film.noses, film.k
+    return Film(t, *map(between, shapes))
 
 
 def _filled(outlines: FloatArray, colour: str, zorder: float) -> PolyCollection:

@@ -34,6 +34,8 @@ class Film:
     """(n, m, 2) m: the footprint."""
     wheels: FloatArray
     """(n, wheels, 4, 2) m: what is drawn of each wheel."""
+    noses: FloatArray
+    """(n, 3, 2) m: a triangle at the front that points ahead."""
     k: FloatArray
     """(n, 2) m: the reference point."""
 
@@ -67,6 +69,7 @@ def film_of(
         at,
         _xy(turn * corners + place),
         _xy(turn * wheels + place).reshape(n, -1, 4, 2),
+        _xy(turn * (_nose(space) @ [1, 1j]) + place),
         _xy(k)[:, 0],
     )
 
@@ -93,12 +96,15 @@ def nose_at(pose: tuple[float, float, float], space: PermissibleSpace) -> FloatA
     space : PermissibleSpace
         With footprint.
     """
+    return _placed(_nose(space), pose, space)
+
+
+def _nose(space: PermissibleSpace) -> FloatArray:
     footprint = np.asarray(space.header.footprint)
     (_, y0), (x1, y1) = footprint.min(axis=0), footprint.max(axis=0)
     size, y = NOSE * float(np.ptp(footprint, axis=0).max()), (y0 + y1) / 2
     back = x1 - size
-    triangle = np.array([[x1, y], [back, y + size / 2], [back, y - size / 2]])
-    return _placed(triangle, pose, space)
+    return np.array([[x1, y], [back, y + size / 2], [back, y - size / 2]])
 
 
 def _placed(

@@ -105,6 +105,7 @@ def _draw_scale(axes: Axes, width: float) -> None:
         f"{length:g} m",
         "lower right",
         pad=0.3,
+        borderpad=0.7,
         sep=3,
         size_vertical=0.004 * width,
         prop={"size": "small"},
@@ -156,9 +157,7 @@ def _draw_way(axes: Axes, solution: Solution) -> None:
         axes.add_collection(
             PolyCollection(list(film.wheels[index]), fc=colour, ec="none", zorder=4)
         )
-        turn = float(trajectory.samples[index, 2])
-        nose = nose_at((*film.k[index].tolist(), turn), solution.space)
-        axes.add_patch(Polygon(nose, fc=colour, ec="none", zorder=5))
+        axes.add_patch(Polygon(film.noses[index], fc=colour, ec="none", zorder=5))
     axes.plot(*film.k.T, color=PATH, lw=1.4, zorder=6)
     stands = _standstills(solution)
     axes.plot(*stands.T, "o", ms=5, color="white", mec=BROKEN, mew=1.5, zorder=7)

@@ -57,6 +57,8 @@ def test_films_follow_the_footprint(sideways: Solution) -> None:
         (0.4, 0.22),
         (0.4, 0.78),
     ]
+    tips = film.noses[:, 0] - footprint[:, 0].max() * np.array([1, 0])
+    assert tips == pytest.approx(film.k - film.k[0])
     at = film_at(film, np.array([1.0]))
     assert at.k[0] == pytest.approx((0, 0.25), abs=1e-3)
     chosen = spread_along(film, 0.1)
