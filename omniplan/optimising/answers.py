@@ -74,12 +74,15 @@ class Answers:
         text = f"{what} {best.score:.4g} {unit}"
         if before is not None:
             text += f" instead of {before.score:.4g} {unit}"
-        if best.way == "plan":
-            text += ", planned anew between the ends: no small change mends the way"
-        if best.way == "timing":
-            text += f", on the path as given{self._end()}"
         if task.objective == "change":
             text += f", at most {best.change:.4g} m; a radian counts 1/κ_g"
+        if best.way == "plan":
+            why = "there was no time to mend the way"
+            if self.repair.is_exhausted:
+                why = "no small change was found"
+            text += f"; planned anew between the ends: {why}"
+        if best.way == "timing":
+            text += f", on the path as given{self._end()}"
         return f"{name}: {text}"
 
     def _end(self) -> str:
@@ -97,7 +100,8 @@ class Answers:
         is_given = miss is None
         if miss is None:
             courses, waits = self.repair.courses, self.repair.waits
-            miss = task.judged(guess_of(courses, waits, task.intervals))
+            given = guess_of(courses, waits, task.intervals)
+            miss = task.judged(task.trajectory_of(given))
         text, place = _refused(miss)
         if is_given:
             text = f"there was no time to mend it; as given: {text}"
@@ -123,7 +127,8 @@ class Answers:
         options: list[Guess] = [] if nearest is None else [nearest]
         if solution is not None and solution.value is not None:
             options.append(solution.value)
-        misses = [self.task.judged(guess) for guess in options]
+        task = self.task
+        misses = [task.judged(task.trajectory_of(guess)) for guess in options]
         if self.attempts.refused is not None:
             misses.append(self.attempts.refused)
         return min(misses, key=_badness, default=None)

@@ -91,9 +91,8 @@ class Task:
         """Return the trajectory of a motion with its verdicts."""
         return self.realised(self.trajectory_of(guess))
 
-    def judged(self, guess: Guess) -> Realised:
-        """Return the trajectory of a motion as it is, with its verdicts."""
-        made = self.trajectory_of(guess)
+    def judged(self, made: Trajectory) -> Realised:
+        """Return a trajectory as it is, with its verdicts."""
         report = validate(
             made,
             self.space,

@@ -6,6 +6,7 @@ import math
 import time as clock
 from collections.abc import Sequence
 from dataclasses import replace
+from numbers import Integral, Real
 from typing import get_args
 
 import numpy as np
@@ -19,7 +20,6 @@ from omniplan.optimising.answers import Answers
 from omniplan.optimising.attempts import Attempts, Candidate, Task
 from omniplan.optimising.hopeless import hopeless_reason
 from omniplan.optimising.limits import rules_of, top_speed
-from omniplan.optimising.realising import Realised
 from omniplan.optimising.repairing import Repair
 from omniplan.optimising.separation import Surroundings
 from omniplan.optimising.setting import Box, Objective
@@ -33,7 +33,6 @@ from omniplan.optimising.warm_start import (
 from omniplan.path import Path
 from omniplan.planning.result import Plan
 from omniplan.trajectory import Trajectory, require_motion
-from omniplan.validation import validate
 
 __all__ = ["optimise"]
 
@@ -74,15 +73,16 @@ def optimise(
     ----------
     motion : Trajectory, Path or Plan
         Where to start, of poses: that of `omniplan.plan`, or any other; it need not
-        keep any limit. The result starts and ends at rest.
+        keep any limit. The result starts and ends at rest, unless it is the one given
+        or that one slowed down.
     space : PermissibleSpace
         With its vehicle: a data sheet alone does not tell all limits.
     obstacles : Obstacles, optional
         The vehicle file must then have a footprint.
     objective : {"time", "smooth", "change"}
         The shortest duration; the least jerk in no more than the given duration; or
-        the smallest change of the poses with which all limits are kept, at whatever
-        speed: a permitted trajectory is then returned as it is.
+        the smallest change with which all limits are kept: a permitted trajectory is
+        then returned as it is. See Notes.
     bounds : (x0, y0, x1, y1) float, m, optional
         The area that the footprint stays in.
     clearance : float, m, ≥ 0
@@ -104,10 +104,12 @@ def optimise(
     -------
     Plan
         Statistics: ``way`` (``solver``, ``timing``: the fastest timing of the given
-        path, or ``input``), ``objective``, ``before`` and ``after`` (what is optimised:
-        s, m²/s⁵ or m; ``before`` only if the input is permitted), ``iterations``,
-        ``solves``, ``solver`` (how it ended), ``unknowns``, ``constraints``,
-        ``solve_time`` s, ``time`` s, and ``largest_change`` m for ``change``.
+        path, ``nearest``: the nearest way that wheels can follow, ``plan``: one planned
+        anew between the ends, or ``input``), ``objective``, ``before`` and ``after``
+        (what is optimised: s, m²/s⁵ or m; ``before`` only if the input is permitted),
+        ``iterations``, ``solves``, ``solver`` (how it ended), ``unknowns``,
+        ``constraints``, ``solve_time`` s, ``time`` s, and ``largest_change`` m for
+        ``change``.
 
     Raises
     ------
@@ -115,6 +117,16 @@ def optimise(
         If an argument is out of range, or the space does not know its vehicle.
     InvalidTrajectory
         If the samples are not poses or do not move.
+
+    Notes
+    -----
+    The change is that of the way of K, at whatever speed. Two poses are
+    ``√(Δx² + Δy² + (Δθ / κ_g)²)`` m apart, a pose is as far from a way as from its
+    nearest pose. The change is the root of the mean square, by length, of the distances
+    of the result's poses from the way given, or of the given poses from the result,
+    whichever is larger (`omniplan.optimising.measure.change_of`); its unit is m. Stops
+    stay where they are. Among equal ways the duration is as near to the given one as
+    can be. What is found is a local optimum of this, less a margin for the proof.
 
     References
     ----------
@@ -185,9 +197,17 @@ def _task(
     _require(
         objective in objectives, "objective", repr(objective), ", ".join(objectives)
     )
-    _require(math.isfinite(time) and time > 0, "time", f"{time}", "positive, s")
-    _require(max_iterations >= 1, "max_iterations", f"{max_iterations}", "at least 1")
-    _require(8 <= intervals <= 120, "intervals", f"{intervals}", "from 8 to 120")
+    is_time = isinstance(time, Real) and math.isfinite(time) and time > 0
+    _require(is_time, "time", repr(time), "positive, s")
+    for name_of, count, low, high, allowed in (
+        ("max_iterations", max_iterations, 1, math.inf, "a whole number, at least 1"),
+        ("intervals", intervals, 8, 120, "a whole number from 8 to 120"),
+    ):
+        is_within = isinstance(count, Integral) and low <= count <= high
+        _require(is_within, name_of, repr(count), allowed)
+    is_room = isinstance(clearance, Real) and math.isfinite(clearance)
+    allowed = "a finite distance of at least 0 m"
+    _require(is_room and clearance >= 0, "clearance", repr(clearance), allowed)
     _require(
         keep_ends or objective == "change",
         "keep_ends",
@@ -272,16 +292,7 @@ class _Optimisation:
         task, given = self._task, self._given
         if isinstance(given, Path):
             return None
-        report = validate(
-            given,
-            task.space,
-            task.tolerances,
-            allow_unreachable=task.allow_unreachable,
-        )
-        hit = None
-        if task.checker is not None:
-            hit = task.checker.first_hit_of_trajectory(given)
-        realised = Realised(given, report, hit)
+        realised = task.judged(given)
         if not realised.is_proved:
             self._attempts.refused = realised
             return None
@@ -307,6 +318,9 @@ class _Optimisation:
         """Return what is permitted near a way that is not."""
         near = self._repair.nearest()
         if near is not None:
+            return self._repair.closer(near)
+        near = self._repair.closest()
+        if near is not None:
             return near
         attempts, start = self._attempts, self._repair.start
         if start is not None:
@@ -317,9 +331,11 @@ class _Optimisation:
                 start, signs, meant=meant, has_swing=swings, share=FIRST
             )
             if found is not None:
-                return found
+                return self._repair.closer(found)
         found = self._improved(self._courses, self._waits)
-        return self._repair.planned() if found is None else found
+        if found is not None:
+            return self._repair.closer(found)
+        return self._repair.planned()
 
     def _fastest(self, timed: Candidate | None) -> Candidate | None:
         """Return the fastest: of the path as it is, or of one near it."""

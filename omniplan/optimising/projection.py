@@ -9,7 +9,6 @@ ranges, places too near an obstacle and the distance from the goal are least squ
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
+from omniplan.optimising.half_planes import Side, sides_of
 from omniplan.optimising.limits import Rules
-from omniplan.optimising.separation import Surroundings, line_between
+from omniplan.optimising.separation import Surroundings
 from omniplan.optimising.setting import Box
 from omniplan.optimising.warm_start import Course
 
@@ -41,8 +41,6 @@ RIPPLE = 0.1
 """Weight of changes of these changes, which splines through the poses exaggerate."""
 ROUNDS, STRICTER = 4, 3.0
 """How often obstacles are looked for anew, and limits weigh more than before."""
-REACH = 1.0
-"""How near an obstacle is when it is looked at, m."""
 ON_THE_SPOT = 0.3
 """A way shorter than this share of its turn over κ_g is no way to be rolled out."""
 CLOSE = 0.02
@@ -69,16 +67,6 @@ TRIALS = (
     Trial(0.3, math.radians(6.0), 0.5),
 )
 """What is tried in turn, from the nearest way to the calmest."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """A half-plane that a part of the body keeps to at one step."""
-
-    step: int
-    arms: ComplexArray
-    normal: complex
-    least: float
 
 
 class _Rollout:
@@ -160,7 +148,7 @@ class _Rollout:
         return place, heading
 
     def residuals(
-        self, x: FloatArray, sides: list[_Side], weight: float = 1.0
+        self, x: FloatArray, sides: list[Side], weight: float = 1.0
     ) -> FloatArray:
         """Return what is to be small, (..., k); limits weigh as much as told."""
         place, heading = self.poses(x)
@@ -204,7 +192,7 @@ class _Rollout:
         return worst < OF_LIMITS * self.trial.spare / 2
 
     def jacobian(
-        self, x: FloatArray, sides: list[_Side], weight: float = 1.0
+        self, x: FloatArray, sides: list[Side], weight: float = 1.0
     ) -> FloatArray:
         """Return the derivatives of the residuals by differences, all at once."""
         step = 1e-7
@@ -246,16 +234,19 @@ def projected(
     if rollout.length < max(ON_THE_SPOT * turn * rollout.arm, 1e-3):
         return None
     x = rollout.start()
-    sides: list[_Side] = []
+    sides: list[Side] = []
     for k in range(ROUNDS):
         if surroundings is not None:
-            sides = _sides(rollout, x, surroundings, room, bounds)
+            place, heading = rollout.poses(x)
+            sides = sides_of(place, heading, surroundings, room, bounds)
         found: Any = least_squares(
             rollout.residuals,
             x,
             jac=rollout.jacobian,
             args=(sides, STRICTER**k),
-            x_scale=1.0,
+            # MINPACK: the others decompose by LAPACK, whose threads wait for each other
+            # for seconds where other work keeps the processors busy
+            method="lm",
             ftol=1e-6,
             xtol=1e-6,
             max_nfev=60,
@@ -264,69 +255,6 @@ def projected(
         if surroundings is None and rollout.is_within(x):
             break
     return _course(rollout, x, course)
-
-
-def _sides(
-    rollout: _Rollout,
-    x: FloatArray,
-    surroundings: Surroundings,
-    room: float,
-    bounds: Box | None,
-) -> list[_Side]:
-    """Return half-planes that keep the body away from what is near, step by step."""
-    place, heading = rollout.poses(x)
-    ahead = np.gradient(place)
-    found: list[_Side] = []
-    for body in surroundings.body:
-        arms = np.array(body)
-        corners = place[:, None] + np.exp(1j * heading)[:, None] * arms
-        for part, (x0, y0, x1, y1) in zip(
-            surroundings.parts, surroundings.boxes, strict=True
-        ):
-            near = (corners.real.max(axis=1) > x0 - REACH) & (
-                corners.real.min(axis=1) < x1 + REACH
-            )
-            near &= (corners.imag.max(axis=1) > y0 - REACH) & (
-                corners.imag.min(axis=1) < y1 + REACH
-            )
-            steps = np.flatnonzero(near[1:-1]) + 1
-            if not steps.size:
-                continue
-            across = 1j * ahead[steps] / np.maximum(np.abs(ahead[steps]), 1e-12)
-            lack = [
-                _lack(corners[steps], part, side * across, room) for side in (1, -1)
-            ]
-            side = 1 if lack[0].sum() <= lack[1].sum() else -1
-            for k, normal in zip(steps.tolist(), (side * across).tolist(), strict=True):
-                gap, direction, _ = line_between(corners[k], part)
-                if gap > 0:
-                    normal = complex(math.cos(direction), math.sin(direction))
-                least = float((part * np.conj(normal)).real.max()) + room
-                found.append(_Side(k, arms, normal, least))
-        if bounds is not None:
-            found += _inside(corners, arms, bounds, room)
-    return found
-
-
-def _inside(
-    corners: ComplexArray, arms: ComplexArray, bounds: Box, room: float
-) -> Iterator[_Side]:
-    """Yield the half-planes of the bounds that are near."""
-    x0, y0, x1, y1 = bounds
-    for normal, wall in ((1, x0), (-1, -x1), (1j, y0), (-1j, -y1)):
-        gap = (corners * np.conj(normal)).real.min(axis=1) - wall
-        for k in (np.flatnonzero(gap[1:-1] < REACH) + 1).tolist():
-            yield _Side(k, arms, complex(normal), wall + room)
-
-
-def _lack(
-    corners: ComplexArray, part: ComplexArray, normals: ComplexArray, room: float
-) -> FloatArray:
-    """Return how far a body would have to move along normals to be clear, m."""
-    conj = normals.conj()[:, None]
-    nearest = (corners * conj).real.min(axis=1)
-    farthest = (part[None] * conj).real.max(axis=1)
-    return np.asarray(np.maximum(farthest + room - nearest, 0.0))
 
 
 def _course(rollout: _Rollout, x: FloatArray, given: Course) -> Course | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from omniplan.optimising.attempts import Attempts, Candidate
 from omniplan.optimising.limits import top_speed
+from omniplan.optimising.polishing import MARGINS, polished
 from omniplan.optimising.projection import TRIALS, Trial, projected
 from omniplan.optimising.realising import Realised, trajectory_of
 from omniplan.optimising.setting import Guess
@@ -41,6 +42,8 @@ class Repair:
     waits: Sequence[float]
     start: Guess | None = None
     """The nearest way that was found last, for a solver to go on from."""
+    near: tuple[Sequence[Course], Sequence[float]] | None = None
+    """The nearest way that was proved, and its waits."""
     is_exhausted: bool = False
     """Whether all ways of finding a nearest way were tried to their end."""
 
@@ -56,8 +59,42 @@ class Repair:
                 self.start = guess_of(found, waits, self.attempts.task.intervals)
             realised = self._realised(found, waits)
             if realised is not None and realised.is_proved:
+                self.near = found, waits
                 return self.attempts.rated(realised, "nearest")
         self.is_exhausted = True
+        return None
+
+    def closer(self, best: Candidate) -> Candidate:
+        """Return a proved trajectory closer to the way given, or the one that is known.
+
+        Parameters
+        ----------
+        best : Candidate
+            Proved, and rated by its change.
+        """
+        found = self._closest(*(self.near or self.courses_along(best)))
+        return best if found is None or found.score >= best.score else found
+
+    def closest(self) -> Candidate | None:
+        """Return a proved trajectory on the closest way around the one given."""
+        for courses, waits in self._readings():
+            found = self._closest(courses, waits)
+            if found is not None:
+                return found
+        return None
+
+    def _closest(
+        self, courses: Sequence[Course], waits: Sequence[float]
+    ) -> Candidate | None:
+        for margin in MARGINS:
+            if self.attempts.time_left <= 0:
+                break
+            found = polished(self.attempts, courses, margin)
+            if found is None:
+                continue
+            realised = self._realised(found, waits)
+            if realised is not None and realised.is_proved:
+                return self.attempts.rated(realised, "nearest")
         return None
 
     def _readings(self) -> Iterator[tuple[Sequence[Course], Sequence[float]]]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
-import naive_limits
-import naive_motion
 import numpy as np
 import pytest
 import random_motions
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from optimised import assert_kept
 from spoiled_motions import CLEARANCE, MISTAKES, REACH, Mistake, mistakes_of, spoiled
 from timing_cases import demanding_vehicle
 
@@ -97,15 +96,6 @@ def assert_mended(seed: int, name: str, mistake: Mistake) -> None:
         t = np.linspace(trajectory.t[0], trajectory.t[-1], 800)
         motion = PoseMotion(trajectory.t, trajectory.samples, 0j)
         assert checker.are_free(motion.poses_at(t)).all()
-    assert space.vehicle is not None
-    simulation = naive_motion.simulate(
-        space.vehicle,
-        trajectory.t,
-        random_motions.motion_of(trajectory),
-        per_interval=2,
-        has_swing=True,
-    )
-    assert naive_limits.breaches(simulation) == []
 
 
 @cache
@@ -130,11 +120,4 @@ def assert_improved(seed: int, kind: VehicleKind) -> None:
     assert validate(trajectory, space).valid
     if timing.trajectory is not None:
         assert trajectory.duration <= timing.trajectory.duration * (1 + 1e-9)
-    simulation = naive_motion.simulate(
-        vehicle,
-        trajectory.t,
-        random_motions.motion_of(trajectory),
-        per_interval=3,
-        has_swing=True,
-    )
-    assert naive_limits.breaches(simulation) == []
+    assert_kept(trajectory, space, per_interval=3)
