@@ -39,7 +39,7 @@ RESTARTS = 3
 """So many searches in a row that find nothing quicker are enough."""
 PATIENCE = 2
 """A search for a quicker way ends after so many times the motions asked before."""
-FIRST_TRY = 400
+FIRST_TRY = 350
 """A search that finds no way starts anew after so many motions, as how long it takes
 varies much from seed to seed; then one that grows its trees in short steps gets half as
 many. With each such pair both numbers are doubled."""

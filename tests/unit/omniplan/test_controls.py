@@ -14,8 +14,8 @@ import omniplan
 from configspace import PermissibleSpace
 from configspace.omni_curve import to_twist
 from omniplan.obstacles import CollisionChecker, Obstacles
-from omniplan.planning import controls
 from omniplan.planning.control_kernels import LEVELS, STEPS, drive
+from omniplan.planning.control_tree import rate_tables
 from omniplan.sampling.intervals import PermittedIntervals
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,7 +39,7 @@ def _driven(
     drive(
         PermittedIntervals(space).table,
         space.tables.load,
-        *controls._rate_tables(space),
+        *rate_tables(space),
         space.line_beta is not None,
         space.is_translating,
         space.kappa_g,
@@ -86,7 +86,7 @@ def test_what_is_driven_is_permitted_and_within_the_rates(
     given = _random_controls(rng, 200)
     line = space.line_beta or 0.0
     states, ends = _driven(space, (0.0, 0.0, 0.0, 0.4, line), given)
-    kappa_rates, beta_rates = controls._rate_tables(space)
+    kappa_rates, beta_rates = rate_tables(space)
     permitted = ends[:, 0] > 0
     assert permitted.any()
     for control, path, (time, _) in zip(
