@@ -40,6 +40,7 @@ def checkers(
     ends : (start, goal)
     """
     from omniplan.obstacles import CollisionChecker, Obstacles
+    from omniplan.obstacles.asked import checked_clearance
 
     if isinstance(obstacles, CollisionChecker):
         if bounds is not None or clearance != 0.0:
@@ -48,6 +49,7 @@ def checkers(
         obstacles.require_body_of(space)
         strict = obstacles
     elif obstacles is None and bounds is None:
+        checked_clearance(clearance)
         return None, None
     elif obstacles is not None and not isinstance(obstacles, Obstacles):
         allowed = "Obstacles, or a CollisionChecker"

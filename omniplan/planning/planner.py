@@ -25,7 +25,7 @@ from omniplan.planning.improve import GAIN, moves_of, shortened
 from omniplan.planning.request import Request, checked_request, refusal
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.route import Route
-from omniplan.planning.search import FIRST, OPTIMISING, Found, direct, search
+from omniplan.planning.search import OPTIMISING, Found, direct, search
 from omniplan.planning.start_up import make_ready
 from omniplan.planning.task import Task
 from omniplan.trajectory import Trajectory
@@ -38,11 +38,15 @@ STANDING = 1e-3
 RESTARTS = 3
 """So many searches in a row that find nothing quicker are enough."""
 PATIENCE = 2
-"""A search for a quicker way ends after so many times the motions asked before."""
+"""A search for a quicker way ends after so many times the motions asked before, or
+after `FIRST_TRY` if that is more."""
 FIRST_TRY = 350
 """A search that finds no way starts anew after so many motions, as how long it takes
 varies much from seed to seed; then one that grows its trees in short steps gets half as
 many. With each such pair both numbers are doubled."""
+EXPLORED = 0.4
+"""Share of the time and motions after which a planner that goes on for ever ends: the
+rest makes its way shorter."""
 MOST_FINISHED = 3
 """Of so many ways the corners are rounded, and all are timed and proved, those that are
 hoped to be the quickest first, until one is accepted."""
@@ -220,17 +224,19 @@ def _ways(task: Task, connector: Connector) -> tuple[list[Found], int]:
 def _searched(
     task: Task, connector: Connector, number: int
 ) -> tuple[Found | None, bool]:
-    """Return what the search of a number found, and whether it is to start anew."""
-    budget, most = task.budget, None
-    pair, is_short = divmod(number - 1, 2)
+    """Return what the search of a number found, and whether it was cut short."""
+    budget, seed = task.budget, task.seed + number
+    if task.planner in OPTIMISING:
+        share = EXPLORED if number == 1 else 1.0
+        found = search(task, connector, seed, share=share)
+        return found, found is None and share < 1
     if budget.has_way:
-        most = PATIENCE * budget.asked
-    elif task.planner in FIRST:
-        most = FIRST_TRY * 2**pair // (1 + is_short)
-    last = math.inf if budget.has_way or most is None else budget.asked + most
-    in_short_steps = bool(is_short) and not budget.has_way
-    seed = task.seed + number
-    found = search(task, connector, seed, most, in_short_steps=in_short_steps)
+        most = max(PATIENCE * budget.asked, FIRST_TRY)
+        return search(task, connector, seed, most), False
+    pair, is_short = divmod(number - 1, 2)
+    most = FIRST_TRY * 2**pair // (1 + is_short)
+    last = budget.asked + most
+    found = search(task, connector, seed, most, in_short_steps=bool(is_short))
     return found, found is None and budget.asked >= last
 
 
@@ -251,11 +257,11 @@ def _quickest(ways: list[Found]) -> float:
 
 
 def _is_enough(task: Task, ways: list[Found]) -> bool:
-    """Return whether the search must end, or one move leads to the goal."""
+    """Return whether the search must end, or nothing can be quicker."""
     task.budget.has_way = bool(ways)
     if task.budget.is_enclosed:
         return True
-    return task.budget.is_over or any(len(way.chain) == 1 for way in ways)
+    return task.budget.is_over or any(way.is_best for way in ways)
 
 
 def _controlled(request: Request) -> Plan:

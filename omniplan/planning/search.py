@@ -38,6 +38,8 @@ class Found:
     """Estimated, s."""
     at: float
     """When it was found, s from the beginning."""
+    is_best: bool = False
+    """Whether nothing that is known is quicker even where nothing stands in the way."""
 
 
 def direct(task: Task, connector: Connector) -> Found | None:
@@ -48,11 +50,13 @@ def direct(task: Task, connector: Connector) -> Found | None:
     task : Task
     connector : Connector
     """
-    for duration, chain in connector.thorough(task.start, task.goal)[:DIRECT]:
+    known = connector.thorough(task.start, task.goal)[:DIRECT]
+    for i, (duration, chain) in enumerate(known):
         if task.budget.is_over:
             return None
         if task.are_free(leg[0].move for leg in chain):
-            return Found(chain, duration, task.budget.elapsed)
+            is_best = i == 0 and len(chain) == 1
+            return Found(chain, duration, task.budget.elapsed, is_best)
     return None
 
 
@@ -62,6 +66,7 @@ def search(
     seed: int,
     most: int | None = None,
     *,
+    share: float = 1.0,
     in_short_steps: bool = False,
 ) -> Found | None:
     """Return a way found by OMPL, or None.
@@ -73,6 +78,8 @@ def search(
     seed : int, ≥ 1
     most : int, optional
         So many motions are checked at most.
+    share : float, (0, 1]
+        When so much of the task's time or motions is used up, it ends.
     in_short_steps : bool
         Whether trees grow in shorter steps than usual, of planners with restarts.
     """
@@ -81,7 +88,8 @@ def search(
     run = _Run(task, connector, ompl, in_short_steps)
     ompl.seeded(seed)
     with ompl.quiet():
-        poses = run.solve(math.inf if most is None else task.budget.asked + most)
+        last = math.inf if most is None else task.budget.asked + most
+        poses = run.solve(last, share)
     if poses is None:
         return None
     chains = [run.chain(a, b) for a, b in itertools.pairwise(poses)]
@@ -113,7 +121,7 @@ class _Run:
             self._known[key] = chain if free else None
         return self._known[key]
 
-    def solve(self, most: float) -> list[Pose] | None:
+    def solve(self, most: float, share: float) -> list[Pose] | None:
         """Return the poses of the way."""
         base, task = self._ompl.base, self._task
         space = self._space(base)
@@ -145,6 +153,8 @@ class _Run:
             if self.first_at is None and problem.hasExactSolution():
                 self.first_at = task.budget.elapsed
             if task.budget.is_over or task.budget.asked >= most:
+                return True
+            if task.budget.is_beyond(share):
                 return True
             return self.first_at is None and task.is_known_enclosed()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -99,6 +100,11 @@ class Budget:
         """Whether time for the search or motions are used up."""
         share = SEARCH if self.has_way else 1.0
         return self.is_spent or self.elapsed >= share * self.seconds
+
+    def is_beyond(self, share: float) -> bool:
+        """Return whether so much of the time, or of the motions, is used up."""
+        motions = math.inf if self.motions is None else self.motions
+        return self.asked >= share * motions or self.elapsed >= share * self.seconds
 
 
 @dataclass(frozen=True, eq=False)

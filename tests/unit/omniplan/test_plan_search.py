@@ -183,3 +183,46 @@ def test_a_proof_that_there_is_no_way_can_be_given_up() -> None:
     assert found.status is PlanStatus.UNREACHABLE
     with pytest.raises(GivenUpError):
         omniplan.plan(*arguments, checkpoint=Countdown(ask.calls - 1), **options)
+
+
+PILLAR = [[(3.0, -1.0), (4.0, -1.0), (4.0, 1.2), (3.0, 1.2)]]
+
+
+def test_one_free_move_does_not_end_the_search() -> None:
+    """Turning on the spot and then driving by takes 9.1 s, one arc around 11.2 s."""
+    found = omniplan.plan(
+        (0, 0, 0),
+        (6, -2, 3),
+        space_of("ift-four-steered"),
+        Obstacles.from_polygons(PILLAR),
+        iterations=1500,
+        time=PATIENT,
+    )
+    assert found.duration is not None
+    assert found.duration < 9.1
+    assert int(found.statistics["searches"]) >= RESTARTS
+
+
+@pytest.mark.parametrize("planner", ["RRTstar", "InformedRRTstar", "BITstar"])
+def test_ways_of_planners_that_optimise_are_made_shorter(planner: str) -> None:
+    """What they find within their time has stops that a short cut saves."""
+    ask = functools.partial(
+        omniplan.plan,
+        (0, 0, 0),
+        (6, -2, 3),
+        space_of("ackermann"),
+        Obstacles.from_polygons(PILLAR),
+        iterations=3000,
+        time=PATIENT,
+    )
+    found, usual = ask(planner=planner), ask()
+    assert found.duration is not None
+    assert usual.duration is not None
+    assert found.duration < 1.2 * usual.duration
+    assert int(found.statistics["iterations"]) < 3000
+
+
+@pytest.mark.parametrize("clearance", [-1.0, math.nan, math.inf])
+def test_a_clearance_is_checked_where_nothing_stands(clearance: float) -> None:
+    with pytest.raises(configspace.InvalidInput, match="clearance"):
+        omniplan.plan((0, 0, 0), (1, 0, 0), space_of("mecanum"), clearance=clearance)
