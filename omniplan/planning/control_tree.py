@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -25,9 +25,10 @@ from configspace.omni_curve import components
 from configspace.rate_cells import cell_rate_limits
 from omniplan.planning.connect import Chain, Connector, chain_time
 from omniplan.planning.control_kernels import LEVELS, STEPS, arcs_of_step, drive
-from omniplan.planning.improve import moves_of
+from omniplan.planning.improve import moves_of, shortened
 from omniplan.planning.moves import Move
 from omniplan.planning.route import Route
+from omniplan.planning.search import Found
 from omniplan.planning.task import Pose, Task
 from omniplan.sampling.intervals import PermittedIntervals
 
@@ -95,17 +96,24 @@ class Tree:
     task : Task
     connector : Connector
         Of the vehicle.
+    seed : int, ≥ 1
+    most : int, optional
+        So many motions are checked at most.
     """
 
-    def __init__(self, task: Task, connector: Connector) -> None:
+    def __init__(
+        self, task: Task, connector: Connector, seed: int, most: int | None = None
+    ) -> None:
         self.task = task
+        self._begun = task.budget.asked
+        self._most = math.inf if most is None else most
         space = task.space
         self._space = space
         self._table = PermittedIntervals(space).table
         self._rates = rate_tables(space)
         self._connector = connector
         self._permits = connector.permits
-        self._random = np.random.default_rng(task.seed)
+        self._random = np.random.default_rng(seed)
         self._pool = _controls(self._random, task)
         self._states = np.empty((BATCH, STEPS + 1, 5))
         self._ends = np.empty((BATCH, 2))
@@ -119,10 +127,17 @@ class Tree:
         task = self.task
         if task.budget.is_over or len(self.ways) >= ENOUGH:
             return True
+        if self._asked >= self._most:
+            return True
         first = self._first_after
         if first is None:
             return task.is_known_enclosed()
-        return task.budget.asked > PATIENCE * first
+        return self._asked > PATIENCE * first
+
+    @property
+    def _asked(self) -> int:
+        """Number of motions that this tree asked about."""
+        return self.task.budget.asked - self._begun
 
     def begin(self) -> list[State]:
         """Return the states to start from: the pose with several configurations."""
@@ -206,20 +221,34 @@ class Tree:
 
     def _connect(self, state: State, time: float) -> None:
         """Look for moves from a state to the goal."""
-        x, y, theta, kappa_n, beta = state
-        pose: Pose = (x, y, theta)
+        pose: Pose = state[:3]
         chain = self._connector.quick(pose, self.task.goal)
         if chain is None or not self.task.are_free(leg[0].move for leg in chain):
             return
         total = time + chain_time(self._permits, chain)
-        if chain:
-            total += min(
-                self._permits.steering_time((kappa_n, beta), drive.start)
-                for drive in chain[0]
-            )
+        total += self._steering(state, chain)
         if self._first_after is None:
-            self._first_after = self.task.budget.asked
+            self._first_after = self._asked
         self.ways.append(_Way(state, chain, total, self.task.budget.elapsed))
+
+    def shortened(self, way: _Way) -> _Way:
+        """Return the way with quicker moves at its end, or the same."""
+        before = chain_time(self._permits, way.chain)
+        tail = Found(way.chain, before, way.at)
+        better = shortened(self.task, self._connector, tail, self._random)
+        if not way.chain or better.duration >= before:
+            return way
+        total = way.time - self._steering(way.last, way.chain) - before
+        total += self._steering(way.last, better.chain) + better.duration
+        return replace(way, chain=better.chain, time=total)
+
+    def _steering(self, state: State, chain: Chain) -> float:
+        """Return the time in which the wheels turn before a chain, s."""
+        if not chain:
+            return 0.0
+        before = state[3], state[4]
+        steering_time = self._permits.steering_time
+        return min(steering_time(before, drive.start) for drive in chain[0])
 
     def route(self, way: _Way) -> Route:
         """Return the poses of a way and where the vehicle stands."""

@@ -15,38 +15,96 @@ S. LaValle, J. Kuffner, Randomized kinodynamic planning, IJRR 2001; spec/omni-cu
 from __future__ import annotations
 
 import math
+import operator
+from dataclasses import dataclass
 from typing import Any
 
+from omniplan.planning.blend import rounded_off
 from omniplan.planning.connect import Connector
 from omniplan.planning.control_tree import State, Tree
+from omniplan.planning.improve import GAIN
 from omniplan.planning.route import Route
-from omniplan.planning.task import Task
+from omniplan.planning.task import RESTARTS, Task
 
-__all__ = ["make_ready", "search"]
+__all__ = [
+    "CONTROL_PLANNERS",
+    "Explored",
+    "explored",
+    "make_ready",
+]
+
+CONTROL_PLANNERS = ("RRT", "KPIECE1")
+"""Planners of OMPL that explore."""
+MOST_ROUNDED = 5
+"""Of so many ways the corners are rounded."""
 
 
-def search(task: Task, connector: Connector) -> tuple[Route, float] | None:
-    """Return a route that OMPL's control planners found and when the first one was, s.
+@dataclass(frozen=True)
+class Explored:
+    """What the searches found."""
 
-    None if there was none in time.
+    routes: tuple[Route, ...]
+    """The one that is hoped to be quickest first; empty: no way was found in time.
+    Those with rounded corners come before what they were made of."""
+    first_at: float
+    """When a way was first known, s; inf: never."""
+    searches: int
+    """So many were begun."""
+
+
+def explored(task: Task, connector: Connector) -> Explored:
+    """Return what OMPL's control planners found, corners rounded off.
+
+    They search again, each time with another seed, while there is time and one of the
+    last `RESTARTS` searches found a quicker way.
 
     Parameters
     ----------
     task : Task
-        With ``planner`` "KPIECE1" the planner of that name explores, else RRT.
+        With a planner of `CONTROL_PLANNERS`.
     connector : Connector
         Of the vehicle.
     """
+    budget = task.budget
+    ways: list[tuple[float, Route]] = []
+    first_at, searches, stale = math.inf, 0, 0
+    while stale < RESTARTS and not budget.is_over:
+        most = budget.patience if ways else None
+        tree = _searched(task, connector, task.seed + searches, most)
+        best = min((time for time, _ in ways), default=math.inf)
+        searches += 1
+        stale += 1
+        if tree.ways:
+            way = tree.shortened(min(tree.ways, key=lambda way: way.time))
+            first_at = min(first_at, tree.ways[0].at)
+            ways.append((way.time, tree.route(way)))
+            stale = 0 if way.time < best - GAIN else stale
+        if not ways:
+            break  # only the end of time, or a proof, ends a first search
+        budget.has_way = True
+    ways.sort(key=operator.itemgetter(0))
+    plain = [route for _, route in ways[:MOST_ROUNDED]]
+    return Explored(_routes(task, connector, plain), first_at, searches)
+
+
+def _routes(task: Task, connector: Connector, plain: list[Route]) -> tuple[Route, ...]:
+    """Return routes with corners rounded off, the quickest first, and then as given."""
+    rounded = [rounded_off(task, connector.permits, route) for route in plain]
+    good = [route for route, _ in sorted(rounded, key=operator.itemgetter(1))]
+    pairs = zip(plain, rounded, strict=True)
+    left = [old for old, (new, _) in pairs if len(new.stops) < len(old.stops)]
+    return (*good, *left)
+
+
+def _searched(task: Task, connector: Connector, seed: int, most: int | None) -> Tree:
+    """Return the tree of one search."""
     from omniplan.sampling import ompl_bindings as ompl
 
-    ompl.seeded(task.seed)
-    tree = Tree(task, connector)
+    ompl.seeded(seed)
+    tree = Tree(task, connector, seed, most)
     with ompl.quiet():
         _explore(tree, ompl)
-    if not tree.ways:
-        return None
-    best = min(tree.ways, key=lambda way: way.time)
-    return tree.route(best), tree.ways[0].at
+    return tree
 
 
 def make_ready(task: Task, connector: Connector) -> None:
@@ -58,10 +116,12 @@ def make_ready(task: Task, connector: Connector) -> None:
         Any, of the vehicle.
     connector : Connector
     """
-    tree = Tree(task, connector)
+    tree = Tree(task, connector, task.seed)
     for state in tree.begin():
         tree.drive(state, 0.5, 0.0)
         tree.drive(state, 0.5, 1.0)
+    for way in tree.ways:
+        rounded_off(task, connector.permits, tree.route(way))
 
 
 def _explore(tree: Tree, ompl: Any) -> None:
@@ -104,11 +164,8 @@ def _explore(tree: Tree, ompl: Any) -> None:
     problem.setGoalState(goal, 1e-12)
     if tree.is_over or problem.getStartStateCount() == 0:
         return
-    if task.planner == "KPIECE1":
-        planner = control.KPIECE1(information)
-        space.registerDefaultProjection(_position(base, space))
-    else:
-        planner = control.RRT(information)
+    space.registerDefaultProjection(_position(base, space))
+    planner = getattr(control, task.planner)(information)
     planner.setProblemDefinition(problem)
     planner.setup()
     planner.solve(base.PlannerTerminationCondition(lambda: tree.is_over))

@@ -27,7 +27,7 @@ from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.route import Route
 from omniplan.planning.search import OPTIMISING, Found, direct, search
 from omniplan.planning.start_up import make_ready
-from omniplan.planning.task import Task
+from omniplan.planning.task import FIRST_TRY, RESTARTS, Task
 from omniplan.trajectory import Trajectory
 from omniplan.validation import validate
 
@@ -35,15 +35,6 @@ __all__ = ["plan"]
 
 STANDING = 1e-3
 """Duration of a plan from a pose to itself, s."""
-RESTARTS = 3
-"""So many searches in a row that find nothing quicker are enough."""
-PATIENCE = 2
-"""A search for a quicker way ends after so many times the motions asked before, or
-after `FIRST_TRY` if that is more."""
-FIRST_TRY = 350
-"""A search that finds no way starts anew after so many motions, as how long it takes
-varies much from seed to seed; then one that grows its trees in short steps gets half as
-many. With each such pair both numbers are doubled."""
 EXPLORED = 0.4
 """Share of the time and motions after which a planner that goes on for ever ends: the
 rest makes its way shorter."""
@@ -97,7 +88,8 @@ def plan(
     planner : str
         Of OMPL: ``RRTConnect`` (a first way soon, then short cuts and new searches),
         ``RRT``, ``KPIECE1``, ``BKPIECE1``, ``LBKPIECE1``; ``RRTstar``,
-        ``InformedRRTstar``, ``BITstar`` and ``FMT`` minimise the travel time.
+        ``InformedRRTstar``, ``BITstar`` and ``FMT`` minimise the travel time. With
+        ``method="control"`` only ``RRT``, which is the default there, and ``KPIECE1``.
     time : float, s, > 0
         For the search; timing and proof come on top, and so does what is done once: a
         first plan compiles kernels, the first one of a vehicle makes its tables. It
@@ -231,8 +223,10 @@ def _searched(
         found = search(task, connector, seed, share=share)
         return found, found is None and share < 1
     if budget.has_way:
-        most = max(PATIENCE * budget.asked, FIRST_TRY)
-        return search(task, connector, seed, most), False
+        return search(task, connector, seed, budget.patience), False
+    # How long a first way takes varies much from seed to seed: the search starts anew
+    # after so many motions; then one that grows its trees in short steps gets half as
+    # many. With each such pair both numbers are doubled.
     pair, is_short = divmod(number - 1, 2)
     most = FIRST_TRY * 2**pair // (1 + is_short)
     last = budget.asked + most
@@ -268,12 +262,18 @@ def _controlled(request: Request) -> Plan:
     from omniplan.planning import controls
 
     task = request.task
-    found = controls.search(task, request.connector)
-    statistics = {**request.statistics, **_spent(task)}
-    if found is None:
+    found = controls.explored(task, request.connector)
+    statistics: Statistics = {**request.statistics, "searches": found.searches}
+    if not found.routes:
         return _nothing(request, statistics)
-    route, statistics["time_to_first"] = found
-    return finished(task, request.ends, request.strict, route, statistics)
+    statistics["time_to_first"] = found.first_at
+    statistics |= _spent(task)
+    plans: list[Plan] = []
+    for route in found.routes:
+        plans.append(finished(task, request.ends, request.strict, route, statistics))
+        if plans[-1].is_found:
+            return plans[-1]
+    return plans[0]
 
 
 def _spent(task: Task) -> dict[str, float | int | str]:

@@ -15,6 +15,7 @@ from configspace.limits import Reason
 from configspace.space import require_space
 from omniplan.planning import arguments, hall
 from omniplan.planning.connect import Connector
+from omniplan.planning.controls import CONTROL_PLANNERS
 from omniplan.planning.finish import Ends
 from omniplan.planning.moves import Move
 from omniplan.planning.permits import Configuration, Permits
@@ -48,8 +49,7 @@ class Request:
     @property
     def statistics(self) -> dict[str, float | int | str]:
         """What is known before the search."""
-        planner = self.task.planner if self.method == "geometric" else self.method
-        return {"planner": planner, "seed": self.task.seed}
+        return {"planner": self.task.planner, "seed": self.task.seed}
 
     @property
     def is_at_goal(self) -> bool:
@@ -86,8 +86,11 @@ method, heading, checkpoint
     vehicle = _vehicle(space)
     a, from_ = arguments.end("start", start)
     b, to = arguments.end("goal", goal)
+    if arguments.one_of("method", method, METHODS) == "control":
+        # The default is the geometric method's.
+        planner = CONTROL_PLANNERS[0] if planner == PLANNERS[0] else planner
+        arguments.one_of("planner", planner, CONTROL_PLANNERS)
     arguments.one_of("planner", planner, PLANNERS)
-    arguments.one_of("method", method, METHODS)
     keeps_heading = arguments.one_of("heading", heading, HEADINGS) == "keep"
     if keeps_heading and method == "control":
         allowed = '"free" with method="control"'

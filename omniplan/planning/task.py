@@ -21,6 +21,11 @@ Bounds: TypeAlias = tuple[float, float, float, float]
 SEARCH = 0.6
 """Share of the time that is for looking for ways, once there is one; the rest is for
 rounding corners."""
+RESTARTS = 3
+"""So many searches in a row that find nothing quicker are enough."""
+PATIENCE, FIRST_TRY = 2, 350
+"""A search for a quicker way ends after `PATIENCE` times the motions asked before, or
+after `FIRST_TRY` if that is more."""
 ENCLOSED, SOON = 0.2, 1.0
 """After this share of the time, or so many seconds, without a way it is looked at
 whether there can be one."""
@@ -100,6 +105,11 @@ class Budget:
         """Whether time for the search or motions are used up."""
         share = SEARCH if self.has_way else 1.0
         return self.is_spent or self.elapsed >= share * self.seconds
+
+    @property
+    def patience(self) -> int:
+        """So many motions are for the next search for a quicker way."""
+        return max(PATIENCE * self.asked, FIRST_TRY)
 
     def is_beyond(self, share: float) -> bool:
         """Return whether so much of the time, or of the motions, is used up."""

@@ -14,8 +14,11 @@ import omniplan
 from configspace import PermissibleSpace
 from configspace.omni_curve import to_twist
 from omniplan.obstacles import CollisionChecker, Obstacles
+from omniplan.planning import controls
 from omniplan.planning.control_kernels import LEVELS, STEPS, drive
 from omniplan.planning.control_tree import rate_tables
+from omniplan.planning.request import Request, checked_request
+from omniplan.planning.task import RESTARTS
 from omniplan.sampling.intervals import PermittedIntervals
 
 FloatArray = npt.NDArray[np.float64]
@@ -130,7 +133,9 @@ def test_a_plan_by_controls_is_driven_around_a_wall(space: PermissibleSpace) -> 
     end = poses[-1] - np.array(goal)
     end[2] = math.remainder(end[2], 2 * math.pi)
     np.testing.assert_allclose(end, 0, atol=1e-9)
-    assert plan.statistics["planner"] == "control"
+    assert plan.statistics["planner"] == "RRT"
+    assert isinstance(plan.statistics["searches"], int)
+    assert plan.statistics["searches"] > 1
 
 
 def test_a_blocked_goal_is_out_of_reach_in_time() -> None:
@@ -172,6 +177,94 @@ def test_a_synchro_drive_is_driven_by_controls_too() -> None:
     assert checker.first_hit_of_trajectory(trajectory) is None
 
 
+WHOLE = {"mecanum": 20_000, "ackermann": 4_000}
+
+
+def _around_a_box(name: str, seed: int, motions: int) -> omniplan.Plan:
+    space = configspace.build_space(configspace.load_vehicle(name))
+    box = Obstacles.from_polygons([[(3, -1), (4, -1), (4, 1.2), (3, 1.2)]])
+    return omniplan.plan(
+        (0, 0, 0),
+        (7, 0, 0),
+        space,
+        box,
+        bounds=(-3, -5, 10, 5),
+        time=60.0,
+        seed=seed,
+        iterations=motions,
+        method="control",
+    )
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_with_motions_left_quicker_ways_are_searched(name: str) -> None:
+    first = _around_a_box(name, 5, 1900)
+    last = _around_a_box(name, 5, WHOLE[name])
+    assert first.duration is not None
+    assert last.duration is not None
+    assert last.duration < 0.8 * first.duration
+    assert isinstance(last.statistics["iterations"], int)
+    assert last.statistics["iterations"] > 1900
+
+
+def test_the_same_seed_and_motions_give_the_same_plan() -> None:
+    one, other = (_around_a_box("mecanum", 4, 9000) for _ in range(2))
+    np.testing.assert_array_equal(
+        one.raise_for_status().samples, other.raise_for_status().samples
+    )
+    assert one.statistics["iterations"] == other.statistics["iterations"]
+
+
+def _request(planner: str, motions: int) -> Request:
+    space = configspace.build_space(configspace.load_vehicle("mecanum"))
+    return checked_request(
+        (2, 2, 0),
+        (10, 3, 0.5),
+        space,
+        Obstacles.from_polygons([WALL]),
+        bounds=HALL,
+        clearance=0.0,
+        planner=planner,
+        time=60.0,
+        seed=1,
+        iterations=motions,
+        method="control",
+        heading="free",
+        checkpoint=None,
+    )
+
+
+def test_searches_are_counted_and_routes_start_and_end_as_asked() -> None:
+    request = _request("RRT", 30_000)
+    found = controls.explored(request.task, request.connector)
+    assert found.searches > RESTARTS
+    assert 0 < found.first_at < request.task.budget.elapsed
+    assert found.routes
+    for route in found.routes:
+        np.testing.assert_allclose(route.poses[0], (2, 2, 0), atol=1e-9)
+        end = route.poses[-1] - np.array([10, 3, 0.5])
+        end[2] = math.remainder(end[2], 2 * math.pi)
+        np.testing.assert_allclose(end, 0, atol=1e-9)
+
+
+def test_a_search_without_a_way_is_the_only_one() -> None:
+    request = _request("RRT", 3)
+    found = controls.explored(request.task, request.connector)
+    assert found == controls.Explored((), math.inf, 1)
+
+
+def test_the_planner_named_is_the_one_that_explores() -> None:
+    def poses(planner: str) -> FloatArray:
+        request = _request(planner, 4000)
+        return controls.explored(request.task, request.connector).routes[0].poses
+
+    np.testing.assert_array_equal(poses("RRTConnect"), poses("RRT"))
+    assert not np.array_equal(poses("KPIECE1"), poses("RRT"))
+    for planner in ("RRTstar", "BKPIECE1"):
+        with pytest.raises(configspace.InvalidInput, match="one of RRT, KPIECE1"):
+            _request(planner, 4000)
+
+
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_plan() -> None:
     space = configspace.build_space(configspace.load_vehicle("mecanum"))
@@ -190,4 +283,5 @@ def test_the_same_seed_gives_the_same_plan() -> None:
         ).duration
 
     assert duration(5) == duration(5)
-    assert duration(5) != duration(6)
+    # The searches of neighbouring seeds are partly the same.
+    assert duration(5) != duration(500)

@@ -16,8 +16,8 @@ import omniplan
 from configspace import Grid, PermissibleSpace
 from omniplan import Plan, PlanStatus
 from omniplan.obstacles import Obstacles
-from omniplan.planning.planner import RESTARTS
 from omniplan.planning.search import PLANNERS
+from omniplan.planning.task import RESTARTS
 
 WALL = {"wall": [(-9.0, 3.0), (9.0, 3.0), (9.0, 3.5), (-9.0, 3.5)]}
 SHELVES = {
