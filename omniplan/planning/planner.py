@@ -25,7 +25,7 @@ from omniplan.planning.improve import GAIN, moves_of, shortened
 from omniplan.planning.request import Request, checked_request, refusal
 from omniplan.planning.result import Plan, PlanStatus
 from omniplan.planning.route import Route
-from omniplan.planning.search import OPTIMISING, Found, direct, search
+from omniplan.planning.search import ENDLESS, OPTIMISING, Found, direct, search
 from omniplan.planning.start_up import make_ready
 from omniplan.planning.task import FIRST_TRY, RESTARTS, Task
 from omniplan.trajectory import Trajectory
@@ -219,7 +219,7 @@ def _searched(
     """Return what the search of a number found, and whether it was cut short."""
     budget, seed = task.budget, task.seed + number
     if task.planner in OPTIMISING:
-        share = EXPLORED if number == 1 else 1.0
+        share = EXPLORED if task.planner in ENDLESS and number == 1 else 1.0
         found = search(task, connector, seed, share=share)
         return found, found is None and share < 1
     if budget.has_way:

@@ -15,11 +15,12 @@ from typing import Any
 from omniplan.planning.connect import Chain, Connector, chain_time, joined
 from omniplan.planning.task import Pose, Task
 
-__all__ = ["FIRST", "OPTIMISING", "PLANNERS", "Found", "direct", "search"]
+__all__ = ["ENDLESS", "OPTIMISING", "PLANNERS", "Found", "direct", "search"]
 
 FIRST = ("RRTConnect", "RRT", "KPIECE1", "BKPIECE1", "LBKPIECE1")
-OPTIMISING = ("RRTstar", "InformedRRTstar", "BITstar", "FMT")
+ENDLESS = ("RRTstar", "InformedRRTstar", "BITstar")
 """These go on looking for quicker ways until their time is over."""
+OPTIMISING = (*ENDLESS, "FMT")
 PLANNERS = (*FIRST, *OPTIMISING)
 CLOSED = 1e6
 """Estimated time of a motion that is not permitted, s."""
