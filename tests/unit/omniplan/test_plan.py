@@ -416,6 +416,10 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.skipif(
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN,
+    reason="interrupts are ignored, as in the background of a shell",
+)
 @pytest.mark.slow
 def test_an_interrupt_ends_a_plan_and_the_next_one_works() -> None:
     with subprocess.Popen(
