@@ -74,7 +74,7 @@ def parts_of(
     for b in range(len(blocks)):
         at = slice(b * LANES, (b + 1) * LANES)
         for r in range(len(rows)):
-            load(blocks, b, room)
+            load(blocks, b, room, False)
             one_row_alone(room, rows, r, vehicle, exact)
             low[r, at] = room[LOW : LOW + LANES]
             high[r, at] = room[HIGH : HIGH + LANES]
@@ -168,7 +168,7 @@ def test_a_range_is_settled_as_by_arc_tangents() -> None:
         ):
             found = []
             for exact in (YES, SETTLING):
-                load(motions.blocks, b, room)
+                load(motions.blocks, b, room, False)
                 one_row_alone(room, rows, int(r), body, exact)
                 found.append(
                     (room[LOW : LOW + LANES] + 0, room[HIGH : HIGH + LANES] + 0)
