@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Literal
 
@@ -166,14 +166,22 @@ def _geometric(request: Request) -> Plan:
     if not ways:
         return _nothing(request, statistics)
     statistics["time_to_first"] = min(found.at for found in ways)
+    routes = _routes(task, request.connector, ways)
+    return _first_proved(request, routes, statistics)
+
+
+def _first_proved(
+    request: Request, routes: Iterable[Route], statistics: Statistics
+) -> Plan:
+    """Return the plan of the first route that is accepted, else that of the first."""
     plans: list[Plan] = []
-    for route in _routes(task, request.connector, ways):
-        plan = finished(task, request.ends, request.strict, route, statistics)
-        spent = {**plan.statistics, **_spent(task)}
+    for route in routes:
+        plan = finished(request.task, request.ends, request.strict, route, statistics)
+        spent = {**plan.statistics, **_spent(request.task)}
         plans.append(replace(plan, statistics=spent))
         if plan.is_found:
-            break
-    return plans[-1] if plans[-1].is_found else plans[0]
+            return plans[-1]
+    return plans[0]
 
 
 def _routes(task: Task, connector: Connector, ways: list[Found]) -> Iterator[Route]:
@@ -261,19 +269,12 @@ def _is_enough(task: Task, ways: list[Found]) -> bool:
 def _controlled(request: Request) -> Plan:
     from omniplan.planning import controls
 
-    task = request.task
-    found = controls.explored(task, request.connector)
+    found = controls.explored(request.task, request.connector)
     statistics: Statistics = {**request.statistics, "searches": found.searches}
     if not found.routes:
         return _nothing(request, statistics)
     statistics["time_to_first"] = found.first_at
-    statistics |= _spent(task)
-    plans: list[Plan] = []
-    for route in found.routes:
-        plans.append(finished(task, request.ends, request.strict, route, statistics))
-        if plans[-1].is_found:
-            return plans[-1]
-    return plans[0]
+    return _first_proved(request, found.routes, statistics)
 
 
 def _spent(task: Task) -> dict[str, float | int | str]:
